@@ -1,0 +1,26 @@
+//! Diffusion on SPH particles.
+//!
+//! The rooms of the house, from the ground up; a room uses only rooms below it:
+//!
+//! | floor | rooms |
+//! |---|---|
+//! | doors | [`ffi`], `cli` |
+//! | users | [`study`] |
+//! | handle | [`solver`], [`io`] |
+//! | plan | [`plan`] |
+//! | motion | [`integrator`], [`model`] |
+//! | discretise | [`operator`] |
+//! | geometry | [`space`] |
+//! | data | [`kernel`] |
+//! | ground | [`error`], [`sum`], [`memory`], [`pool`], [`words`] |
+
+pub mod error;
+pub mod memory;
+pub mod pool;
+pub mod sum;
+
+pub mod kernel;
+
+pub mod integrator;
+
+pub mod io;

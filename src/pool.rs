@@ -1,0 +1,124 @@
+//! Worker threads that belong to one solver: created with it, joined when it goes. Never rayon's global pool.
+//!
+//! All work is cut into fixed blocks whose results are combined in block order, so the number of threads never
+//! changes a bit of a result.
+
+use crate::error::{Error, Result};
+use rayon::prelude::*;
+use std::sync::{Arc, Mutex};
+use std::thread::JoinHandle;
+
+/// Particles per block of parallel work. Fixed: results must not depend on the number of threads.
+pub const BLOCK: usize = 1024;
+
+pub struct Pool {
+    threads: usize,
+    workers: Option<rayon::ThreadPool>,
+    handles: Arc<Mutex<Vec<JoinHandle<()>>>>,
+}
+
+impl Pool {
+    /// `threads` workers; 0 means as many as this process may use (affinity and cgroups count). One thread makes no
+    /// worker at all: the caller's thread does the work.
+    pub fn new(threads: usize) -> Result<Pool> {
+        let threads = match threads {
+            0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
+            n => n,
+        };
+        let handles = Arc::new(Mutex::new(Vec::new()));
+        let workers = if threads > 1 { Some(spawn_workers(threads, &handles)?) } else { None };
+        Ok(Pool { threads, workers, handles })
+    }
+
+    pub fn threads(&self) -> usize {
+        self.threads
+    }
+
+    /// `f(0), f(1), … f(n - 1)` in any order of execution, results in order.
+    pub fn map<T: Send>(&self, n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
+        match &self.workers {
+            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().map(&f).collect()),
+            _ => (0..n).map(f).collect(),
+        }
+    }
+
+    /// Calls `f(start, chunk)` for consecutive chunks of `data`, `chunk` items long (the last may be shorter).
+    pub fn chunks<T: Send>(&self, data: &mut [T], chunk: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+        match &self.workers {
+            Some(pool) if data.len() > chunk => pool.install(|| {
+                data.par_chunks_mut(chunk).enumerate().for_each(|(i, part)| f(i * chunk, part));
+            }),
+            _ => data.chunks_mut(chunk).enumerate().for_each(|(i, part)| f(i * chunk, part)),
+        }
+    }
+
+    /// Runs a closure inside the pool, so that rayon's own algorithms (sorts) use these workers and no others.
+    pub fn install<T: Send>(&self, f: impl FnOnce() -> T + Send) -> Option<T> {
+        self.workers.as_ref().map(|pool| pool.install(f))
+    }
+
+    /// Forgets the workers without joining: in a forked child they do not exist.
+    pub fn abandon(self) {
+        std::mem::forget(self);
+    }
+}
+
+impl Drop for Pool {
+    fn drop(&mut self) {
+        // Dropping rayon's pool only tells its threads to stop; a host that unloads the library needs them gone.
+        self.workers = None;
+        let handles = self.handles.lock().map(|mut h| std::mem::take(&mut *h)).unwrap_or_default();
+        for handle in handles {
+            let _ = handle.join();
+        }
+    }
+}
+
+fn spawn_workers(threads: usize, handles: &Arc<Mutex<Vec<JoinHandle<()>>>>) -> Result<rayon::ThreadPool> {
+    let kept = Arc::clone(handles);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .spawn_handler(move |thread| {
+            let name = format!("diffusph-{}", thread.index());
+            let handle = std::thread::Builder::new().name(name).spawn(|| thread.run())?;
+            if let Ok(mut list) = kept.lock() {
+                list.push(handle);
+            }
+            Ok(())
+        })
+        .build()
+        .map_err(|e| Error::bad("threads", threads, &format!("the system would not start them: {e}")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_for_any_number_of_threads() {
+        for threads in [1, 2, 5] {
+            let pool = Pool::new(threads).unwrap();
+            assert_eq!(pool.map(1000, |i| i * i), (0..1000).map(|i| i * i).collect::<Vec<_>>());
+            let mut data = vec![0usize; 5000];
+            pool.chunks(&mut data, BLOCK, |start, part| part.iter_mut().enumerate().for_each(|(i, x)| *x = start + i));
+            assert!(data.iter().enumerate().all(|(i, &x)| i == x));
+        }
+    }
+
+    #[test]
+    fn workers_are_gone_after_drop() {
+        let workers = || {
+            let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+            tasks
+                .filter_map(|t| std::fs::read_to_string(t.ok()?.path().join("comm")).ok())
+                .filter(|c| c.starts_with("diffusph-9"))
+                .count()
+        };
+        // The tenth worker's name is this test's alone: other tests in this process use fewer threads.
+        let pool = Pool::new(10).unwrap();
+        pool.map(100, |i| i);
+        assert_eq!(workers(), 1);
+        drop(pool);
+        assert_eq!(workers(), 0);
+    }
+}

@@ -1,0 +1,69 @@
+//! Sums, norms and extrema over particles that are the same to the bit for any number of threads: fixed blocks, each
+//! added up in order, block sums combined in block order with compensation (Neumaier 1974).
+
+use crate::pool::{BLOCK, Pool};
+
+/// The compensated sum of a few numbers, in order.
+pub fn compensated(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut lost) = (0.0f64, 0.0f64);
+    for v in values {
+        let next = sum + v;
+        lost += if sum.abs() >= v.abs() { (sum - next) + v } else { (v - next) + sum };
+        sum = next;
+    }
+    sum + lost
+}
+
+/// The sum of `term(i)` for i in 0..n.
+pub fn sum(pool: &Pool, n: usize, term: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
+    compensated(blocks(pool, n, |range| compensated(range.map(&term))))
+}
+
+/// The largest `term(i)`; negative infinity where n is 0. A NaN is passed on.
+pub fn max(pool: &Pool, n: usize, term: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
+    let larger = |a: f64, b: f64| if a.is_nan() || a > b { a } else { b };
+    let parts = blocks(pool, n, |range| range.map(&term).fold(f64::NEG_INFINITY, larger));
+    parts.into_iter().fold(f64::NEG_INFINITY, larger)
+}
+
+/// The smallest `term(i)`; infinity where n is 0. A NaN is passed on.
+pub fn min(pool: &Pool, n: usize, term: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
+    -max(pool, n, |i| -term(i))
+}
+
+/// The first index for which `test` holds.
+pub fn first(pool: &Pool, n: usize, test: impl Fn(usize) -> bool + Sync + Send) -> Option<usize> {
+    blocks(pool, n, |mut range| range.find(|&i| test(i))).into_iter().flatten().next()
+}
+
+fn blocks<T: Send>(pool: &Pool, n: usize, f: impl Fn(std::ops::Range<usize>) -> T + Sync + Send) -> Vec<T> {
+    pool.map(n.div_ceil(BLOCK), |b| f(b * BLOCK..((b + 1) * BLOCK).min(n)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sums_do_not_depend_on_threads() {
+        let term = |i: usize| ((i * 2654435761) % 1000003) as f64 * 1e-3 - 500.0;
+        let one = sum(&Pool::new(1).unwrap(), 100_000, term);
+        for threads in [2, 3, 4] {
+            assert_eq!(sum(&Pool::new(threads).unwrap(), 100_000, term).to_bits(), one.to_bits());
+        }
+    }
+
+    #[test]
+    fn cancellation_is_compensated() {
+        assert_eq!(compensated([1.0, 1e100, 1.0, -1e100]), 2.0);
+    }
+
+    #[test]
+    fn extrema_pass_nan_on() {
+        let pool = Pool::new(1).unwrap();
+        assert_eq!(max(&pool, 3, |i| [1.0, 3.0, 2.0][i]), 3.0);
+        assert_eq!(min(&pool, 3, |i| [1.0, 3.0, 2.0][i]), 1.0);
+        assert!(max(&pool, 2, |i| [f64::NAN, 1.0][i]).is_nan() && min(&pool, 2, |i| [1.0, f64::NAN][i]).is_nan());
+        assert_eq!(first(&pool, 5000, |i| i >= 2000), Some(2000));
+    }
+}
