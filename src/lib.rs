@@ -14,12 +14,16 @@
 //! | data | [`kernel`] |
 //! | ground | [`error`], [`sum`], [`memory`], [`pool`], [`words`] |
 
+pub mod array;
 pub mod error;
 pub mod memory;
 pub mod pool;
 pub mod sum;
+pub mod words;
 
 pub mod kernel;
+
+pub mod space;
 
 pub mod integrator;
 

@@ -1,0 +1,201 @@
+//! The particles' positions in internal order, and the way back to the host's order.
+
+use super::{Axes, Domain, morton};
+use crate::array::Strided;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::pool::{BLOCK, Pool};
+use rayon::slice::ParallelSliceMut;
+
+/// Each cell is cut this many times per axis (in powers of two) for the order inside it.
+const CUTS: i32 = 2;
+
+/// Positions sorted along a Morton curve. Ties are broken by coordinates, then by host index.
+#[derive(Debug, Clone)]
+pub struct Cloud {
+    pub domain: Domain,
+    /// Coordinates by axis, inside the box on periodic axes; axes beyond `dim` are empty.
+    pub x: Axes<Vec<f64>>,
+    /// `host[i]` is the host's index of internal particle i.
+    pub host: Vec<u32>,
+    pub grid: Grid,
+}
+
+/// The finest cells of the Morton curve.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    pub dim: usize,
+    pub lo: Axes<f64>,
+    pub edge: f64,
+}
+
+impl Grid {
+    /// Cells so that `reach` is a whole number of them; coarser where the extent would not fit a key.
+    fn new(domain: &Domain, lo: Axes<f64>, hi: Axes<f64>, reach: f64) -> Grid {
+        let extent = (0..domain.dim).map(|a| hi[a] - lo[a]).fold(0.0, f64::max);
+        let mut edge = reach * 0.5f64.powi(CUTS);
+        let room = 2f64.powi(morton::bits(domain.dim) as i32 - 1);
+        if edge.is_nan() || edge <= extent / room {
+            let doublings = if edge > 0.0 { (extent / room / edge).log2().ceil() } else { f64::INFINITY };
+            edge = if doublings < 1000.0 { edge * 2f64.powi(doublings as i32) } else { extent / room };
+        }
+        Grid { dim: domain.dim, lo, edge: edge.max(f64::MIN_POSITIVE) }
+    }
+
+    /// The fine cell coordinate of a position on an axis: a monotone function, clamped to the grid.
+    pub fn coordinate(&self, axis: usize, x: f64) -> u64 {
+        let last = (1u64 << morton::bits(self.dim)) - 1;
+        (((x - self.lo[axis]) / self.edge) as u64).min(last)
+    }
+
+    /// The Morton key of the fine cell of a position.
+    pub fn key(&self, x: Axes<f64>) -> u64 {
+        let mut cell = [0; 3];
+        for (axis, c) in cell.iter_mut().enumerate().take(self.dim) {
+            *c = self.coordinate(axis, x[axis]);
+        }
+        morton::key(self.dim, cell)
+    }
+}
+
+impl Cloud {
+    /// Sorts the host's positions. `reach` is the shortest distance (the support radius of the smallest particle) that
+    /// a search will ask for; 0 where it is not known yet.
+    ///
+    /// # Errors
+    /// `BadElement` for a coordinate that is not finite, `BadValue` for more than 2³² − 1 particles, `NoMemory`.
+    pub fn sort(domain: &Domain, x: Strided, reach: f64, pool: &Pool) -> Result<Cloud> {
+        if x.len() >= u32::MAX as usize {
+            return Err(Error::bad("n", x.len(), "at most 2^32 - 2 particles per solver"));
+        }
+        x.check("x", "coordinates must be finite", f64::is_finite)?;
+        let (lo, hi) = bounds(domain, x);
+        let grid = Grid::new(domain, lo, hi, reach);
+        let position = |i: usize| {
+            let mut p = [0.0; 3];
+            for (axis, value) in p.iter_mut().enumerate().take(domain.dim) {
+                *value = domain.wrap(axis, x.at(i, axis));
+            }
+            p
+        };
+        let mut order = memory::filled("Morton keys", x.len(), (0u64, 0u32))?;
+        pool.chunks(&mut order, BLOCK, |start, part| {
+            for (k, item) in part.iter_mut().enumerate() {
+                *item = (grid.key(position(start + k)), (start + k) as u32);
+            }
+        });
+        let compare = |a: &(u64, u32), b: &(u64, u32)| {
+            a.0.cmp(&b.0).then_with(|| {
+                let (p, q) = (position(a.1 as usize), position(b.1 as usize));
+                let by_axis = (0..3).map(|k| p[k].total_cmp(&q[k])).find(|c| c.is_ne());
+                by_axis.unwrap_or(a.1.cmp(&b.1))
+            })
+        };
+        if pool.install(|| order.par_sort_unstable_by(compare)).is_none() {
+            order.sort_unstable_by(compare);
+        }
+        let host = memory::collected("order", order.iter().map(|item| item.1))?;
+        let mut axes = [const { Vec::new() }; 3];
+        for (axis, values) in axes.iter_mut().enumerate().take(domain.dim) {
+            *values = memory::filled("positions", host.len(), 0.0)?;
+            pool.chunks(values, BLOCK, |start, part| {
+                for (k, value) in part.iter_mut().enumerate() {
+                    *value = domain.wrap(axis, x.at(host[start + k] as usize, axis));
+                }
+            });
+        }
+        Ok(Cloud { domain: domain.clone(), x: axes, host, grid })
+    }
+
+    pub fn len(&self) -> usize {
+        self.host.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.host.is_empty()
+    }
+
+    pub fn dim(&self) -> usize {
+        self.domain.dim
+    }
+
+    pub fn position(&self, i: usize) -> Axes<f64> {
+        let mut p = [0.0; 3];
+        for (value, axis) in p.iter_mut().zip(&self.x).take(self.dim()) {
+            *value = axis[i];
+        }
+        p
+    }
+
+    /// Whether the host's positions are the ones held here, bit for bit after wrapping.
+    pub fn is_at(&self, x: Strided, pool: &Pool) -> bool {
+        let moved = |i: usize| {
+            (0..self.dim()).any(|a| self.x[a][i] != self.domain.wrap(a, x.at(self.host[i] as usize, a)))
+        };
+        x.len() == self.len() && crate::sum::first(pool, self.len(), moved).is_none()
+    }
+
+    /// Host values in internal order.
+    pub fn inward(&self, what: &str, values: Strided, component: usize) -> Result<Vec<f64>> {
+        memory::collected(what, self.host.iter().map(|&h| values.at(h as usize, component)))
+    }
+
+    /// Bytes held.
+    pub fn bytes(&self) -> u64 {
+        self.x.iter().map(memory::bytes).sum::<u64>() + memory::bytes(&self.host)
+    }
+}
+
+fn bounds(domain: &Domain, x: Strided) -> (Axes<f64>, Axes<f64>) {
+    let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
+    for axis in 0..domain.dim {
+        (lo[axis], hi[axis]) = if domain.periodic[axis] {
+            (domain.lo[axis], domain.hi[axis])
+        } else {
+            let start = (f64::INFINITY, f64::NEG_INFINITY);
+            (0..x.len()).map(|i| x.at(i, axis)).fold(start, |(lo, hi), v| (lo.min(v), hi.max(v)))
+        };
+    }
+    (lo, hi)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scattered(n: usize, dim: usize) -> Vec<f64> {
+        let mut state = 7u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        (0..n * dim).map(|_| next()).collect()
+    }
+
+    #[test]
+    fn order_is_a_permutation_and_forgets_the_hosts_order() {
+        let (pool, domain) = (Pool::new(2).unwrap(), Domain::open(3));
+        let x = scattered(2000, 3);
+        let reversed: Vec<f64> = x.chunks(3).rev().flatten().copied().collect();
+        let sort = |v: &[f64]| Cloud::sort(&domain, Strided::new("x", v, 2000, 3, 3).unwrap(), 0.1, &pool).unwrap();
+        let (a, b) = (sort(&x), sort(&reversed));
+        assert_eq!(a.x, b.x);
+        let mut seen = a.host.clone();
+        seen.sort_unstable();
+        assert!(seen.iter().enumerate().all(|(i, &h)| i == h as usize));
+        assert!(a.is_at(Strided::new("x", &x, 2000, 3, 3).unwrap(), &pool));
+        assert!(!a.is_at(Strided::new("x", &reversed, 2000, 3, 3).unwrap(), &pool));
+    }
+
+    #[test]
+    fn extreme_extents_fit_the_grid() {
+        let pool = Pool::new(1).unwrap();
+        for reach in [0.0, 1e-300, 1e-3, 1e300] {
+            let x = [0.0, 1e8, 1e8 + 1.0, -1e-5, 5.0, 5.0];
+            let cloud = Cloud::sort(&Domain::open(1), Strided::packed(&x), reach, &pool).unwrap();
+            assert_eq!(cloud.len(), 6);
+        }
+        let e = Cloud::sort(&Domain::open(1), Strided::packed(&[0.0, f64::INFINITY]), 1.0, &pool).unwrap_err();
+        assert_eq!(e.to_string(), "x[1] is inf; coordinates must be finite");
+    }
+}

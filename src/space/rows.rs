@@ -1,0 +1,392 @@
+//! Rows of neighbours: for each particle a, every particle b (and every periodic image of it) with
+//! r_ab < R max(h_a, h_b), found cell by cell and handed on as slices.
+//!
+//! The rule is symmetric to the bit: r_ab is computed from (x_b − x_a) + shift, whose negative is exactly
+//! (x_a − x_b) − shift.
+
+use super::cells::Cells;
+use super::{Axes, Cloud};
+use crate::error::Result;
+use crate::memory;
+use crate::pool::{BLOCK, Pool};
+use std::ops::Range;
+
+/// The neighbours of particle `i`, itself excluded (its periodic images included), in a fixed order.
+pub struct Row<'a> {
+    pub i: usize,
+    /// Internal indices of the neighbours.
+    pub j: &'a [u32],
+    /// Distances.
+    pub r: &'a [f64],
+    /// r_b − r_a by axis; axes beyond `dim` are empty.
+    pub d: Axes<&'a [f64]>,
+}
+
+impl Row<'_> {
+    pub fn len(&self) -> usize {
+        self.j.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.j.is_empty()
+    }
+}
+
+/// A neighbour search over a cloud: cells plus the smoothing lengths they were made for.
+pub struct Rows<'a> {
+    pub cloud: &'a Cloud,
+    pub h: &'a [f64],
+    pub radius: f64,
+    cells: Cells,
+}
+
+/// Buffers of one worker, reused from row to row.
+#[derive(Default)]
+pub struct Scratch {
+    j: Vec<u32>,
+    x: Axes<Vec<f64>>,
+    shift: Axes<Vec<f64>>,
+    cut2: Vec<f64>,
+    r2: Vec<f64>,
+    hits: Vec<u32>,
+    row_j: Vec<u32>,
+    row_r: Vec<f64>,
+    row_d: Axes<Vec<f64>>,
+}
+
+impl<'a> Rows<'a> {
+    /// `h` in internal order, `radius` the kernel's support in units of h.
+    ///
+    /// # Errors
+    /// `BoxTooSmall` where a support reaches too many images of a periodic box; `NoMemory`.
+    pub fn new(cloud: &'a Cloud, h: &'a [f64], radius: f64, pool: &Pool) -> Result<Rows<'a>> {
+        let cells = Cells::new(cloud, h, radius, pool)?;
+        if let Some(largest) = h.iter().position(|&hi| hi == cells.h_max) {
+            cloud.domain.check_reach(radius * cells.h_max, cloud.host[largest] as usize)?;
+        }
+        Ok(Rows { cloud, h, radius, cells })
+    }
+
+    /// Whether all smoothing lengths are the same.
+    pub fn same_h(&self) -> bool {
+        self.cells.same_h
+    }
+
+    /// Calls `visit` with the row of every particle in `range`, in order.
+    pub fn visit(&self, range: Range<usize>, scratch: &mut Scratch, visit: impl FnMut(Row)) -> Result<()> {
+        match self.cloud.dim() {
+            1 => self.visit_in::<1>(range, scratch, visit),
+            2 => self.visit_in::<2>(range, scratch, visit),
+            _ => self.visit_in::<3>(range, scratch, visit),
+        }
+    }
+
+    /// One value per particle from its row: blocks in parallel, the same bits for any number of threads.
+    pub fn map<T: Send>(&self, pool: &Pool, out: &mut [T], f: impl Fn(Row) -> T + Sync + Send) -> Result<()> {
+        let failed = std::sync::Mutex::new(None);
+        pool.chunks(out, BLOCK, |start, part| {
+            let range = start..start + part.len();
+            let done = self.visit(range, &mut Scratch::default(), |row| {
+                let at = row.i - start;
+                part[at] = f(row);
+            });
+            if let (Err(e), Ok(mut slot)) = (done, failed.lock()) {
+                *slot = Some(e);
+            }
+        });
+        failed.into_inner().ok().flatten().map_or(Ok(()), Err)
+    }
+
+    /// The mean number of neighbours, from a sample of the blocks; one block in `every` is looked at.
+    pub fn mean_neighbours(&self, pool: &Pool, every: usize) -> Result<f64> {
+        let blocks = self.cloud.len().div_ceil(BLOCK);
+        let sampled: Vec<usize> = (0..blocks).step_by(every.max(1)).collect();
+        let counts = pool.map(sampled.len(), |k| {
+            // A slice of each sampled block is enough: rows of one block resemble each other.
+            let start = sampled[k] * BLOCK;
+            let range = start..(start + BLOCK / 8).min(self.cloud.len());
+            let (mut pairs, rows) = (0u64, range.len() as u64);
+            self.visit(range, &mut Scratch::default(), |row| pairs += row.len() as u64).map(|()| (pairs, rows))
+        });
+        let (mut pairs, mut rows) = (0, 0);
+        for count in counts {
+            let (p, r) = count?;
+            (pairs, rows) = (pairs + p, rows + r);
+        }
+        Ok(if rows == 0 { 0.0 } else { pairs as f64 / rows as f64 })
+    }
+
+    fn visit_in<const D: usize>(&self, range: Range<usize>, s: &mut Scratch, mut visit: impl FnMut(Row)) -> Result<()> {
+        let group_of = |i: usize| self.cells.group_key(self.cloud, i, self.h[i]);
+        let mut start = range.start;
+        while start < range.end {
+            let group = group_of(start);
+            let end = (start + 1..range.end).find(|&i| group_of(i) != group).unwrap_or(range.end);
+            let shifted = self.gather(start..end, s)?;
+            for i in start..end {
+                let n = if shifted { self.hits::<D, true>(i, s)? } else { self.hits::<D, false>(i, s)? };
+                let d = [0, 1, 2].map(|a| if a < D { &s.row_d[a][..n] } else { &[] });
+                visit(Row { i, j: &s.row_j[..n], r: &s.row_r[..n], d });
+            }
+            start = end;
+        }
+        Ok(())
+    }
+
+    /// Collects every particle that may be a neighbour of someone in the group; tells whether any is an image.
+    fn gather(&self, group: Range<usize>, s: &mut Scratch) -> Result<bool> {
+        let dim = self.cloud.dim();
+        let (lo, hi) = self.extent(group.clone());
+        let h_group = self.h[group].iter().copied().fold(0.0, f64::max);
+        let same_h = self.cells.same_h;
+        s.clear_candidates();
+        let (mut shifted, mut failed) = (false, Ok(()));
+        for level in &self.cells.levels {
+            let reach = self.radius * h_group.max(level.h_max);
+            // Slack for rounding of the interval ends; the distance test below decides, and it is symmetric.
+            let pad = |x: f64| reach * (1.0 + 1e-9) + 4.0 * f64::EPSILON * x.abs();
+            let mut from = lo;
+            let mut to = hi;
+            for a in 0..dim {
+                (from[a], to[a]) = (lo[a] - pad(lo[a]), hi[a] + pad(hi[a]));
+            }
+            self.for_images(from, to, |shift, from, to| {
+                shifted |= shift != [0.0; 3];
+                level.overlapping(self.cloud, from, to, |cell| {
+                    let added = s.add_candidates(self.cloud, cell, shift, (!same_h).then_some((self.h, self.radius)));
+                    if added.is_err() {
+                        failed = added;
+                    }
+                });
+            });
+        }
+        failed.map(|()| shifted)
+    }
+
+    fn extent(&self, group: Range<usize>) -> (Axes<f64>, Axes<f64>) {
+        let (mut lo, mut hi) = ([0.0; 3], [0.0; 3]);
+        for a in 0..self.cloud.dim() {
+            let x = &self.cloud.x[a][group.clone()];
+            lo[a] = x.iter().copied().fold(f64::INFINITY, f64::min);
+            hi[a] = x.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        }
+        (lo, hi)
+    }
+
+    /// Calls `visit(shift, from, to)` for every image of the domain that a box touches: the image's shift, and the box
+    /// as seen from inside the domain.
+    fn for_images(&self, from: Axes<f64>, to: Axes<f64>, mut visit: impl FnMut(Axes<f64>, Axes<f64>, Axes<f64>)) {
+        let domain = &self.cloud.domain;
+        let images = |a: usize| if a < domain.dim { domain.images(a, from[a], to[a]) } else { 0..=0 };
+        for kz in images(2) {
+            for ky in images(1) {
+                for kx in images(0) {
+                    let k = [kx, ky, kz];
+                    let shift = [0, 1, 2].map(|a| if k[a] == 0 { 0.0 } else { k[a] as f64 * domain.length(a) });
+                    visit(shift, [0, 1, 2].map(|a| from[a] - shift[a]), [0, 1, 2].map(|a| to[a] - shift[a]));
+                }
+            }
+        }
+    }
+
+    /// Fills the scratch row with the candidates that are within reach of particle i; returns how many.
+    fn hits<const D: usize, const SHIFTED: bool>(&self, i: usize, s: &mut Scratch) -> Result<usize> {
+        let n = s.j.len();
+        s.reserve_row(n, D)?;
+        let xi: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
+        let x: [&[f64]; D] = std::array::from_fn(|a| &s.x[a][..n]);
+        let shift: [&[f64]; D] = std::array::from_fn(|a| if SHIFTED { &s.shift[a][..n] } else { &s.x[a][..n] });
+        let delta = |a: usize, c: usize| {
+            let d = x[a][c] - xi[a];
+            if SHIFTED { d + shift[a][c] } else { d }
+        };
+        let r2 = &mut s.r2[..n];
+        for (c, r2) in r2.iter_mut().enumerate() {
+            let mut sum = 0.0;
+            for a in 0..D {
+                let d = delta(a, c);
+                sum += d * d;
+            }
+            *r2 = sum;
+        }
+        let reach = self.radius * self.h[i];
+        let own = reach * reach;
+        let hits = &mut s.hits[..n];
+        let mut found = 0;
+        if self.cells.same_h {
+            for (c, &r2) in s.r2[..n].iter().enumerate() {
+                hits[found] = c as u32;
+                found += usize::from(r2 < own);
+            }
+        } else {
+            for (c, (&r2, &cut2)) in s.r2[..n].iter().zip(&s.cut2[..n]).enumerate() {
+                hits[found] = c as u32;
+                found += usize::from(r2 < own.max(cut2));
+            }
+        }
+        let mut len = 0;
+        for &c in &hits[..found] {
+            let c = c as usize;
+            let d: [f64; D] = std::array::from_fn(|a| delta(a, c));
+            s.row_j[len] = s.j[c];
+            s.row_r[len] = s.r2[c];
+            for a in 0..D {
+                s.row_d[a][len] = d[a];
+            }
+            let itself = s.j[c] as usize == i && (!SHIFTED || (0..D).all(|a| shift[a][c] == 0.0));
+            len += usize::from(!itself);
+        }
+        s.row_r[..len].iter_mut().for_each(|r| *r = r.sqrt());
+        Ok(len)
+    }
+}
+
+impl Scratch {
+    fn clear_candidates(&mut self) {
+        self.j.clear();
+        self.cut2.clear();
+        self.x.iter_mut().chain(&mut self.shift).for_each(Vec::clear);
+    }
+
+    /// `lengths`: smoothing lengths and kernel radius, where they differ from particle to particle.
+    fn add_candidates(
+        &mut self,
+        cloud: &Cloud,
+        cell: &[u32],
+        shift: Axes<f64>,
+        lengths: Option<(&[f64], f64)>,
+    ) -> Result<()> {
+        let failed = |_| memory::no_memory::<f64>("neighbour candidates", cell.len());
+        self.j.try_reserve(cell.len()).map_err(failed)?;
+        self.j.extend_from_slice(cell);
+        for (a, &by) in shift.iter().enumerate().take(cloud.dim()) {
+            self.x[a].try_reserve(cell.len()).map_err(failed)?;
+            self.x[a].extend(cell.iter().map(|&j| cloud.x[a][j as usize]));
+            self.shift[a].try_reserve(cell.len()).map_err(failed)?;
+            self.shift[a].extend(cell.iter().map(|_| by));
+        }
+        if let Some((h, radius)) = lengths {
+            self.cut2.try_reserve(cell.len()).map_err(failed)?;
+            self.cut2.extend(cell.iter().map(|&j| (radius * h[j as usize]).powi(2)));
+        }
+        Ok(())
+    }
+
+    fn reserve_row(&mut self, n: usize, dim: usize) -> Result<()> {
+        fn grow<T: Clone + Default>(v: &mut Vec<T>, n: usize) -> Result<()> {
+            if n > v.len() {
+                v.try_reserve(n - v.len()).map_err(|_| memory::no_memory::<T>("a row of neighbours", n))?;
+                v.resize(n, T::default());
+            }
+            Ok(())
+        }
+        grow(&mut self.r2, n)?;
+        grow(&mut self.hits, n)?;
+        grow(&mut self.row_j, n)?;
+        grow(&mut self.row_r, n)?;
+        self.row_d.iter_mut().take(dim).try_for_each(|d| grow(d, n))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::array::Strided;
+    use crate::space::Domain;
+
+    struct Random(u64);
+
+    impl Random {
+        fn next(&mut self) -> f64 {
+            self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (self.0 >> 11) as f64 / (1u64 << 53) as f64
+        }
+    }
+
+    /// Every pair and image by the definition.
+    fn brute_force(cloud: &Cloud, h: &[f64], radius: f64, i: usize) -> Vec<(u32, u64)> {
+        let (dim, domain) = (cloud.dim(), &cloud.domain);
+        let images = |a: usize| if a < dim && domain.periodic[a] { -7i64..=7 } else { 0..=0 };
+        let mut found = Vec::new();
+        for j in 0..cloud.len() {
+            for (kx, ky, kz) in images(0).flat_map(|x| images(1).flat_map(move |y| images(2).map(move |z| (x, y, z)))) {
+                let k = [kx, ky, kz];
+                let (p, q) = (cloud.position(i), cloud.position(j));
+                let r2: f64 = (0..dim).map(|a| (q[a] - p[a]) + k[a] as f64 * domain.length(a)).map(|d| d * d).sum();
+                let reach = radius * h[i].max(h[j]);
+                if r2 < reach * reach && (i != j || k != [0; 3]) {
+                    found.push((j as u32, r2.sqrt().to_bits()));
+                }
+            }
+        }
+        found.sort_unstable();
+        found
+    }
+
+    fn agrees_with_brute_force(dim: usize, n: usize, periodic: [bool; 3], spread: f64, h0: f64) {
+        let pool = Pool::new(2).unwrap();
+        let mut random = Random(dim as u64 * 31 + n as u64);
+        let x: Vec<f64> = (0..n * dim).map(|_| random.next()).collect();
+        let domain = Domain::new(&[0.0; 3][..dim], &[1.0; 3][..dim], &periodic[..dim]).unwrap();
+        let cloud = Cloud::sort(&domain, Strided::new("x", &x, n, dim, dim).unwrap(), 2.0 * h0, &pool).unwrap();
+        let h: Vec<f64> = (0..n).map(|_| h0 * spread.powf(random.next())).collect();
+        let rows = Rows::new(&cloud, &h, 2.0, &pool).unwrap();
+        assert_eq!(rows.same_h(), spread == 1.0);
+        let mut pairs = 0;
+        rows.visit(0..n, &mut Scratch::default(), |row| {
+            let mut got: Vec<(u32, u64)> = row.j.iter().zip(row.r).map(|(&j, r)| (j, r.to_bits())).collect();
+            got.sort_unstable();
+            assert_eq!(got, brute_force(&cloud, &h, 2.0, row.i), "dim {dim} n {n} row {}", row.i);
+            pairs += got.len();
+        })
+        .unwrap();
+        assert!(pairs > 0);
+    }
+
+    #[test]
+    fn rows_equal_brute_force() {
+        for dim in 1..=3 {
+            for periodic in [[false; 3], [true; 3], [true, false, true]] {
+                agrees_with_brute_force(dim, 300, periodic, 1.0, 0.08);
+                agrees_with_brute_force(dim, 300, periodic, 70.0, 0.004);
+            }
+        }
+    }
+
+    #[test]
+    fn a_box_smaller_than_the_support_uses_all_images() {
+        agrees_with_brute_force(1, 5, [true; 3], 1.0, 0.7);
+        agrees_with_brute_force(2, 4, [true; 3], 3.0, 0.5);
+        agrees_with_brute_force(3, 2, [true; 3], 1.0, 0.9);
+    }
+
+    #[test]
+    fn coincident_and_far_apart_particles() {
+        let pool = Pool::new(1).unwrap();
+        let x = [0.5, 0.5, 0.5 + 1e-300, 1e-300, 0.0, 1e12];
+        let cloud = Cloud::sort(&Domain::open(1), Strided::packed(&x), 0.2, &pool).unwrap();
+        let rows = Rows::new(&cloud, &[0.1; 6], 2.0, &pool).unwrap();
+        let mut counts = [0; 6];
+        rows.visit(0..6, &mut Scratch::default(), |row| counts[cloud.host[row.i] as usize] = row.len()).unwrap();
+        assert_eq!(counts, [2, 2, 2, 1, 1, 0]);
+    }
+
+    #[test]
+    fn blocks_do_not_change_a_row() {
+        let pool = Pool::new(1).unwrap();
+        let mut random = Random(5);
+        let x: Vec<f64> = (0..6000).map(|_| random.next()).collect();
+        let domain = Domain::new(&[0.0; 2], &[1.0; 2], &[true; 2]).unwrap();
+        let cloud = Cloud::sort(&domain, Strided::new("x", &x, 3000, 2, 2).unwrap(), 0.06, &pool).unwrap();
+        let h = vec![0.03; 3000];
+        let rows = Rows::new(&cloud, &h, 2.0, &pool).unwrap();
+        let collect = |cuts: &[usize]| {
+            let mut all: Vec<Vec<u32>> = Vec::new();
+            for w in cuts.windows(2) {
+                rows.visit(w[0]..w[1], &mut Scratch::default(), |row| all.push(row.j.to_vec())).unwrap();
+            }
+            all
+        };
+        assert_eq!(collect(&[0, 3000]), collect(&[0, 1, 700, 701, 1500, 3000]));
+    }
+}
