@@ -42,6 +42,22 @@ impl Pool {
         }
     }
 
+    /// As [`Pool::map`], with scratch space that a worker makes once and reuses.
+    pub fn map_init<S, T: Send>(
+        &self,
+        n: usize,
+        init: impl Fn() -> S + Sync + Send,
+        f: impl Fn(&mut S, usize) -> T + Sync + Send,
+    ) -> Vec<T> {
+        match &self.workers {
+            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().map_init(&init, &f).collect()),
+            _ => {
+                let mut scratch = init();
+                (0..n).map(|i| f(&mut scratch, i)).collect()
+            }
+        }
+    }
+
     /// Calls `f(start, chunk)` for consecutive chunks of `data`, `chunk` items long (the last may be shorter).
     pub fn chunks<T: Send>(&self, data: &mut [T], chunk: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
         match &self.workers {

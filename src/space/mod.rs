@@ -5,6 +5,7 @@
 
 pub mod cells;
 pub mod cloud;
+pub mod density;
 pub mod domain;
 pub mod morton;
 pub mod rows;

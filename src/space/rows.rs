@@ -81,16 +81,26 @@ impl<'a> Rows<'a> {
         }
     }
 
-    /// One value per particle from its row: blocks in parallel, the same bits for any number of threads.
-    pub fn map<T: Send>(&self, pool: &Pool, out: &mut [T], f: impl Fn(Row) -> T + Sync + Send) -> Result<()> {
+    /// One value per particle from its row: blocks in parallel, the same bits for any number of threads. `B` is what a
+    /// worker reuses from row to row.
+    pub fn map<T: Send, B: Default>(
+        &self,
+        pool: &Pool,
+        out: &mut [T],
+        f: impl Fn(&mut B, Row) -> Result<T> + Sync + Send,
+    ) -> Result<()> {
         let failed = std::sync::Mutex::new(None);
         pool.chunks(out, BLOCK, |start, part| {
+            let (mut buffers, mut inner) = (B::default(), Ok(()));
             let range = start..start + part.len();
             let done = self.visit(range, &mut Scratch::default(), |row| {
                 let at = row.i - start;
-                part[at] = f(row);
+                match f(&mut buffers, row) {
+                    Ok(value) => part[at] = value,
+                    Err(e) => inner = Err(e),
+                }
             });
-            if let (Err(e), Ok(mut slot)) = (done, failed.lock()) {
+            if let (Err(e), Ok(mut slot)) = (done.and(inner), failed.lock()) {
                 *slot = Some(e);
             }
         });

@@ -1,0 +1,22 @@
+//! Second derivatives on particles: the table of operators, averages of the conductivity, and the engines that apply
+//! them.
+//!
+//! Every operator here is a pair sum (Biriukov & Price 2019; Brookshaw 1985):
+//!
+//! ```text
+//! m_a du_a/dt = Σ_b V_a V_b kappa_ab w_ab (T_b − T_a),     V = m/rho,  w_ab = w_ba
+//! ```
+//!
+//! so energy is exchanged in equal and opposite parts, constants are kept exactly, and where w ≥ 0 a maximum principle
+//! holds.
+
+pub mod gradient;
+pub mod mean;
+pub mod moments;
+pub mod once;
+pub mod spectrum;
+pub mod table;
+
+pub use mean::Mean;
+pub use once::{Assembly, Matrix};
+pub use table::Operator;
