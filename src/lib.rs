@@ -25,6 +25,8 @@ pub mod kernel;
 
 pub mod space;
 
+pub mod operator;
+
 pub mod integrator;
 
 pub mod io;
