@@ -26,8 +26,8 @@ pub enum Error {
         "the step made T grow: its weighted norm rose from {before:e} to {after:e} where nothing heats; operator {operator} has growing modes on these particles: use operator=brookshaw or operator=kernel"
     )]
     Growth { before: f64, after: f64, operator: String },
-    #[error("cancelled by the host after {done} of {total} sub-steps; nothing was changed")]
-    Cancelled { done: u64, total: u64 },
+    #[error("cancelled by the host; nothing was changed")]
+    Cancelled,
     #[error(
         "{what} did not converge after {iterations} iterations (residual {residual:e}, wanted {wanted:e}); {remedy}"
     )]
@@ -93,7 +93,7 @@ impl Error {
             Error::NotFinite { .. } => 2,
             Error::OutOfBounds { .. } => 3,
             Error::Growth { .. } => 4,
-            Error::Cancelled { .. } => 5,
+            Error::Cancelled => 5,
             Error::NotConverged { .. } => 6,
             Error::CallbackFailed { .. } => 7,
             Error::NullPointer { .. } => -1,

@@ -28,5 +28,10 @@ pub mod space;
 pub mod operator;
 
 pub mod integrator;
+pub mod model;
+
+pub mod plan;
+
+pub mod solver;
 
 pub mod io;

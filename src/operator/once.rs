@@ -176,9 +176,15 @@ impl Block {
 }
 
 impl Block {
-    fn sums(&self, t: &[f64], out: &mut [f64], g: impl Fn(usize, usize, f64) -> f64) {
+    fn sums(
+        &self,
+        t: &[f64],
+        out: &mut [f64],
+        finish: impl Fn(usize, f64) -> f64,
+        g: impl Fn(usize, usize, f64) -> f64,
+    ) {
         for ((i, col, coef), out) in self.rows().zip(out) {
-            *out = row_sum(col, coef, t, t[i], |j, c| g(i, j, c));
+            *out = finish(i, row_sum(col, coef, t, t[i], |j, c| g(i, j, c)));
         }
     }
 }
@@ -218,10 +224,18 @@ impl Matrix {
         });
     }
 
-    /// out_a = Σ_b g_ab mean(k_a, k_b) (T_b − T_a), the mean left out where `kappa` is none.
+    /// out_a = finish(a, Σ_b g_ab mean(k_a, k_b) (T_b − T_a)), the mean left out where `kappa` is none.
     ///
     /// `quiet` skips blocks whose values and neighbours' values are all the same: their sums are exactly zero.
-    pub fn apply(&self, pool: &Pool, kappa: Option<(Mean, &[f64])>, t: &[f64], out: &mut [f64], quiet: bool) {
+    pub fn apply(
+        &self,
+        pool: &Pool,
+        kappa: Option<(Mean, &[f64])>,
+        t: &[f64],
+        out: &mut [f64],
+        quiet: bool,
+        finish: impl Fn(usize, f64) -> f64 + Sync + Send,
+    ) {
         let levels = quiet.then(|| self.levels(pool, t));
         pool.chunks(out, BLOCK, |start, part| {
             let block = &self.blocks[start / BLOCK];
@@ -230,15 +244,15 @@ impl Matrix {
             }
             // One loop per average, so that the choice is made once per block and not once per pair.
             match kappa {
-                None => block.sums(t, part, |_, _, c| c),
-                Some((Mean::Harmonic, k)) => block.sums(t, part, |i, j, c| c * Mean::Harmonic.of(k[i], k[j])),
-                Some((Mean::Arithmetic, k)) => block.sums(t, part, |i, j, c| c * Mean::Arithmetic.of(k[i], k[j])),
-                Some((Mean::Geometric, k)) => block.sums(t, part, |i, j, c| c * Mean::Geometric.of(k[i], k[j])),
+                None => block.sums(t, part, &finish, |_, _, c| c),
+                Some((Mean::Harmonic, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Harmonic.of(k[i], k[j])),
+                Some((Mean::Arithmetic, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Arithmetic.of(k[i], k[j])),
+                Some((Mean::Geometric, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Geometric.of(k[i], k[j])),
             }
         });
     }
 
-    /// Σ_b |g_ab| mean(k_a, k_b) of each row, and |Σ_b g_ab mean| beside it: what Gershgorin's circles are made of.
+    /// Σ_b |g_ab| mean(k_a, k_b) of each row, and |Σ_b g_ab mean(k_a, k_b)| beside it: what Gershgorin's circles are made of.
     pub fn circles(&self, pool: &Pool, kappa: Option<(Mean, &[f64])>) -> Result<Vec<(f64, f64)>> {
         let mut out = memory::filled("row sums", self.n, (0.0, 0.0))?;
         pool.chunks(&mut out, BLOCK, |start, part| {

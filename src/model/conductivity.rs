@@ -1,0 +1,119 @@
+//! kappa(T): named laws, or a function of the host's.
+
+use crate::error::{Error, Result};
+use crate::words::Words;
+
+/// A law kappa(T) given in words.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Law {
+    /// kappa0 (T/T0)^n
+    Power { kappa0: f64, t0: f64, n: f64 },
+    /// Straight lines between points, constant outside.
+    Table { t: Vec<f64>, kappa: Vec<f64> },
+}
+
+/// Every law with its words.
+pub static LAWS: &[(&str, &str)] = &[
+    ("power", "kappa0 (T/T0)^n: 'power kappa0=1 T0=300 n=2.5'; T0 defaults to 1, kappa0 to 1"),
+    ("table", "straight lines between points, constant outside: 'table T=300,400,600 kappa=1,1.2,2'"),
+];
+
+impl Law {
+    /// Reads a law from its words.
+    ///
+    /// # Errors
+    /// `UnknownWord` or `BadValue` naming the word.
+    pub fn parse(line: &str) -> Result<Law> {
+        let mut words = Words::parse("law", line)?;
+        let name = words.bare().unwrap_or("");
+        let law = match name {
+            "power" => Law::power(&mut words)?,
+            "table" => Law::table(&mut words)?,
+            _ => return Err(Error::unknown("law", name, LAWS.iter().map(|(name, _)| name))),
+        };
+        words.done()?;
+        Ok(law)
+    }
+
+    fn power(words: &mut Words) -> Result<Law> {
+        let not_negative = |v: f64| v.is_finite() && v >= 0.0;
+        let positive = |v: f64| v.is_finite() && v > 0.0;
+        let kappa0 = words.number("kappa0", "kappa0 must be finite and not negative", not_negative)?.unwrap_or(1.0);
+        let t0 = words.number("T0", "T0 must be positive", positive)?.unwrap_or(1.0);
+        let n = words.number("n", "n must be finite", f64::is_finite)?;
+        let n = n.ok_or_else(|| Error::bad("law", "'power' without n", "give the exponent, like n=2.5"))?;
+        Ok(Law::Power { kappa0, t0, n })
+    }
+
+    fn table(words: &mut Words) -> Result<Law> {
+        let missing = |what: &str| Error::bad("law", format!("'table' without {what}"), "give T=… and kappa=…");
+        let t = words.list("T")?.ok_or_else(|| missing("T"))?;
+        let kappa = words.list("kappa")?.ok_or_else(|| missing("kappa"))?;
+        if t.len() != kappa.len() {
+            let (got, expected) = (kappa.len() as i64, t.len() as i64);
+            let remedy = "one kappa for each T".into();
+            return Err(Error::WrongCount { argument: "kappa".into(), got, expected, remedy });
+        }
+        if let Some(i) = (1..t.len()).find(|&i| t[i] <= t[i - 1]) {
+            return Err(Error::bad_at("T", i, t[i], "the temperatures of a table must increase"));
+        }
+        if let Some(i) = kappa.iter().position(|&k| k < 0.0) {
+            return Err(Error::bad_at("kappa", i, kappa[i], "conductivity must not be negative"));
+        }
+        Ok(Law::Table { t, kappa })
+    }
+
+    pub fn at(&self, temperature: f64) -> f64 {
+        match self {
+            Law::Power { kappa0, t0, n } => kappa0 * (temperature / t0).powf(*n),
+            Law::Table { t, kappa } => interpolate(t, kappa, temperature),
+        }
+    }
+}
+
+fn interpolate(t: &[f64], kappa: &[f64], at: f64) -> f64 {
+    let above = t.partition_point(|&x| x <= at);
+    if above == 0 {
+        return kappa[0];
+    }
+    if above == t.len() {
+        return kappa[above - 1];
+    }
+    let (t0, t1, k0, k1) = (t[above - 1], t[above], kappa[above - 1], kappa[above]);
+    k0 + (k1 - k0) * ((at - t0) / (t1 - t0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn laws_have_their_values() {
+        let power = Law::parse("power kappa0=2 T0=10 n=2.5").unwrap();
+        assert!((power.at(40.0) - 2.0 * 32.0).abs() < 1e-12);
+        assert_eq!(power.at(0.0), 0.0);
+        let table = Law::parse("table T=300,400,600 kappa=1,2,1").unwrap();
+        for (t, k) in [(0.0, 1.0), (300.0, 1.0), (350.0, 1.5), (400.0, 2.0), (500.0, 1.5), (600.0, 1.0), (1e9, 1.0)] {
+            assert_eq!(table.at(t), k, "kappa({t})");
+        }
+    }
+
+    #[test]
+    fn wrong_laws_say_what_is_wrong() {
+        let cases = [
+            ("powr n=1", "did you mean 'power'"),
+            ("power", "without n"),
+            ("power n=x", "n is 'x'"),
+            ("power n=1 T0=0", "T0 must be positive"),
+            ("power n=1 T1=3", "T1"),
+            ("table T=1,2 kappa=1", "kappa has 1 values, expected 2"),
+            ("table T=2,1 kappa=1,1", "T[1] is 1"),
+            ("table T=1,2 kappa=1,-1", "kappa[1] is -1"),
+            ("", "unknown law"),
+        ];
+        for (line, expected) in cases {
+            let text = Law::parse(line).unwrap_err().to_string();
+            assert!(text.contains(expected), "{line}: {text}");
+        }
+    }
+}

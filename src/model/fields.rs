@@ -1,0 +1,187 @@
+//! The named quantities of the model `heat`: what a host may set, what it may get, and what values make sense.
+
+use crate::error::{Error, Result};
+
+/// What values a quantity may take.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Domain {
+    Finite,
+    Positive,
+    NonNegative,
+}
+
+impl Domain {
+    pub fn holds(self, v: f64) -> bool {
+        match self {
+            Domain::Finite => v.is_finite(),
+            Domain::Positive => v.is_finite() && v > 0.0,
+            Domain::NonNegative => v.is_finite() && v >= 0.0,
+        }
+    }
+
+    pub fn rule(self) -> &'static str {
+        match self {
+            Domain::Finite => "it must be finite",
+            Domain::Positive => "it must be positive and finite",
+            Domain::NonNegative => "it must be finite and not negative",
+        }
+    }
+}
+
+/// A quantity per particle. Units are SI where the host uses SI; any consistent system works.
+pub struct Field {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub about: &'static str,
+    /// Components: 1, or one per axis.
+    pub vector: bool,
+    pub access: Access,
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Access {
+    /// Set by the host (and readable); holds its default until then, if it has one.
+    Input { domain: Domain, default: Option<f64> },
+    /// Computed when asked for.
+    Output,
+}
+
+const fn input(name: &'static str, unit: &'static str, domain: Domain, default: Option<f64>, about: &'static str) -> Field {
+    Field { name, unit, about, vector: false, access: Access::Input { domain, default } }
+}
+
+const fn output(name: &'static str, unit: &'static str, about: &'static str) -> Field {
+    Field { name, unit, about, vector: false, access: Access::Output }
+}
+
+const fn vector(field: Field) -> Field {
+    Field { vector: true, ..field }
+}
+
+use Domain::{Finite, NonNegative, Positive};
+
+/// Inputs first: their position is the index of their storage.
+pub static FIELDS: &[Field] = &[
+    input("T", "K", Finite, None, "temperature"),
+    input("m", "kg", Positive, None, "mass"),
+    input("rho", "kg/m^3", Positive, None, "density; without it, the sum over neighbours"),
+    input("h", "m", Positive, None, "smoothing length; without it, h_fac (m/rho)^(1/nu)"),
+    input("kappa", "W/(m K)", NonNegative, None, "thermal conductivity"),
+    input("c_v", "J/(kg K)", Positive, Some(1.0), "heat capacity per mass"),
+    input("fixed", "-", Finite, Some(0.0), "not 0: the particle keeps its T, whatever flows in or out"),
+    input("source", "W/m^3", Finite, Some(0.0), "heat released per volume"),
+    input("flux_in", "W/m^2", Finite, Some(0.0), "heat flux into the particle's area from outside"),
+    input("h_conv", "W/(m^2 K)", NonNegative, Some(0.0), "heat transfer coefficient to T_ambient (Robin)"),
+    input("emissivity", "-", NonNegative, Some(0.0), "radiative exchange emissivity sigma_SB (T_ambient^4 - T^4)"),
+    input("T_ambient", "K", NonNegative, Some(0.0), "temperature of the surroundings"),
+    input("area", "m^2", NonNegative, None, "area that faces outside; without it, one face of a cube, V^((nu-1)/nu)"),
+    vector(output("x", "m", "position, inside the box on periodic axes")),
+    output("u", "J/kg", "energy per mass, c_v T"),
+    output("rate", "W/kg", "du/dt from diffusion, surface and source"),
+    output("dT_dt", "K/s", "dT/dt; 0 where T is fixed"),
+    output("K_d2", "-", "second moment of the operator (1 for a perfect Laplacian)"),
+    vector(output("first_moment", "-", "h times the first moment of the operator (0 for a perfect Laplacian)")),
+    output("neighbours", "-", "number of neighbours"),
+    output("omega", "-", "grad-h factor"),
+    vector(output("grad_T", "K/m", "temperature gradient, exact for linear fields")),
+    vector(output("flux", "W/m^2", "heat flux -kappa grad T")),
+];
+
+/// Position of an input in [`FIELDS`] and in a solver's storage.
+pub type Slot = usize;
+
+pub const T: Slot = 0;
+pub const M: Slot = 1;
+pub const RHO: Slot = 2;
+pub const H: Slot = 3;
+pub const KAPPA: Slot = 4;
+pub const C_V: Slot = 5;
+pub const FIXED: Slot = 6;
+pub const SOURCE: Slot = 7;
+pub const FLUX_IN: Slot = 8;
+pub const H_CONV: Slot = 9;
+pub const EMISSIVITY: Slot = 10;
+pub const T_AMBIENT: Slot = 11;
+pub const AREA: Slot = 12;
+pub const INPUTS: usize = 13;
+
+/// A single number of a solver.
+pub struct Number {
+    pub name: &'static str,
+    pub unit: &'static str,
+    pub about: &'static str,
+    /// What a host may set it to; none for results.
+    pub settable: Option<Domain>,
+}
+
+const fn result(name: &'static str, unit: &'static str, about: &'static str) -> Number {
+    Number { name, unit, about, settable: None }
+}
+
+pub static NUMBERS: &[Number] = &[
+    Number { name: "time", unit: "s", about: "time reached", settable: Some(Finite) },
+    Number {
+        name: "sigma_SB",
+        unit: "W/(m^2 K^4)",
+        about: "Stefan-Boltzmann constant in the host's units",
+        settable: Some(NonNegative),
+    },
+    result("n", "-", "number of particles"),
+    result("energy", "J", "sum of m c_v T"),
+    result("T_min", "K", "smallest temperature"),
+    result("T_max", "K", "largest temperature"),
+    result("limit", "s", "largest stable explicit (Euler) step"),
+    result("spectral_bound", "1/s", "upper bound on the operator's largest rate"),
+    result("smallest_weight", "m^(nu-2)", "smallest pair weight V_a V_b w_ab; negative where positivity is lost"),
+    result("mean_neighbours", "-", "mean number of neighbours"),
+    result("K_d2_min", "-", "smallest second moment of the operator"),
+    result("K_d2_max", "-", "largest second moment of the operator"),
+    result("bytes", "bytes", "memory held for particles and weights"),
+    result("threads", "-", "worker threads"),
+];
+
+/// Stefan-Boltzmann constant, CODATA 2018 (exact), W/(m² K⁴).
+pub const SIGMA_SB: f64 = 5.670374419e-8;
+
+/// The slot of an input.
+pub fn slot(name: &str) -> Result<Slot> {
+    let inputs = &FIELDS[..INPUTS];
+    inputs.iter().position(|f| f.name == name).ok_or_else(|| match FIELDS.iter().find(|f| f.name == name) {
+        Some(_) => Error::bad("name", format!("'{name}'"), "this quantity is computed, it cannot be set"),
+        None => Error::unknown("field", name, inputs.iter().map(|f| f.name)),
+    })
+}
+
+/// The description of any field.
+pub fn field(name: &str) -> Result<&'static Field> {
+    let found = FIELDS.iter().find(|f| f.name == name);
+    found.ok_or_else(|| Error::unknown("field", name, FIELDS.iter().map(|f| f.name)))
+}
+
+/// The description of any number.
+pub fn number(name: &str) -> Result<&'static Number> {
+    let found = NUMBERS.iter().find(|f| f.name == name);
+    found.ok_or_else(|| Error::unknown("number", name, NUMBERS.iter().map(|f| f.name)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slots_are_the_positions_of_the_inputs() {
+        let named = [
+            (T, "T"), (M, "m"), (RHO, "rho"), (H, "h"), (KAPPA, "kappa"), (C_V, "c_v"), (FIXED, "fixed"),
+            (SOURCE, "source"), (FLUX_IN, "flux_in"), (H_CONV, "h_conv"), (EMISSIVITY, "emissivity"),
+            (T_AMBIENT, "T_ambient"), (AREA, "area"),
+        ];
+        assert_eq!(named.len(), INPUTS);
+        for (at, name) in named {
+            assert_eq!(slot(name).unwrap(), at);
+        }
+        let is_input = |f: &Field| matches!(f.access, Access::Input { .. });
+        assert!(FIELDS.iter().enumerate().all(|(i, f)| is_input(f) == (i < INPUTS)));
+        assert!(slot("grad_T").unwrap_err().to_string().contains("computed"));
+        assert!(slot("kapa").unwrap_err().to_string().contains("'kappa'"));
+    }
+}

@@ -1,0 +1,154 @@
+//! Heat: the right-hand side dT/dt = (Σ_b g_ab kappa_ab (T_b − T_a) + surface + source) / (m c_v).
+//!
+//! A particle with fixed temperature is one with an infinite capacity: its 1/(m c_v) is 0 and nothing else is special.
+
+use super::conductivity::Law;
+use super::surface::Surface;
+use crate::error::{Error, Result};
+use crate::operator::{Mean, once::Matrix};
+use crate::pool::{BLOCK, Pool};
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// A host's function: fills the last slice for time t and temperatures T; the `u32`s are the host's particle numbers.
+/// A code other than 0 stops the step.
+pub type Callback = Box<dyn FnMut(f64, &[u32], &[f64], &mut [f64]) -> i32 + Send>;
+
+/// Where the conductivity comes from.
+pub enum Conductivity<'a> {
+    /// One number for all pairs.
+    Number(f64),
+    /// Already in the stored coefficients.
+    Folded,
+    /// One number per particle, averaged for each pair.
+    Field(&'a [f64]),
+    /// A law in words, evaluated into a buffer for every right-hand side.
+    Law(&'a Law, &'a mut [f64]),
+    /// The host's function, likewise.
+    Host(&'a mut Callback, &'a mut [f64]),
+}
+
+/// Heat released in the volume.
+pub enum Release<'a> {
+    None,
+    /// W/m³ per particle.
+    Field(&'a [f64]),
+    /// The host's function, W/m³, evaluated into a buffer.
+    Host(&'a mut Callback, &'a mut [f64]),
+}
+
+/// The right-hand side, with everything that the scene needs and nothing else.
+pub struct Heat<'a> {
+    pub pool: &'a Pool,
+    pub matrix: &'a Matrix,
+    pub mean: Mean,
+    /// 1/(m c_v), 0 where T is fixed.
+    pub inverse_capacity: &'a [f64],
+    pub conductivity: Conductivity<'a>,
+    pub surface: Option<&'a Surface>,
+    pub release: Release<'a>,
+    pub volume: &'a [f64],
+    /// The host's number of each particle.
+    pub host: &'a [u32],
+    /// Skip blocks in which nothing differs.
+    pub quiet: bool,
+    /// Set by the host from any thread to stop the step.
+    pub cancel: &'a AtomicBool,
+    /// How often [`Heat::rate`] was called.
+    pub applications: u64,
+}
+
+impl Heat<'_> {
+    /// dT/dt at time `time` for temperatures `t`.
+    ///
+    /// # Errors
+    /// `Cancelled`; `CallbackFailed` with the host's code; `BadElement` when a callback gives a negative or non-finite kappa.
+    pub fn rate(&mut self, time: f64, t: &[f64], rate: &mut [f64]) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled);
+        }
+        self.applications += 1;
+        self.evaluate_kappa(time, t)?;
+        self.diffuse(t, rate);
+        if let Some(surface) = self.surface {
+            surface.add(t, self.inverse_capacity, rate);
+        }
+        self.release(time, t, rate)
+    }
+
+    /// The diffusive part of dT/dt alone, with the conductivity evaluated last.
+    pub fn diffuse(&self, t: &[f64], rate: &mut [f64]) {
+        let inverse = self.inverse_capacity;
+        let factor = if let Conductivity::Number(k) = self.conductivity { k } else { 1.0 };
+        self.matrix.apply(self.pool, self.pair_kappa(), t, rate, self.quiet, |i, sum| sum * factor * inverse[i]);
+    }
+
+    /// For each particle the radius and the centre's size of its Gershgorin circle, in 1/s.
+    pub fn circles(&mut self, time: f64, t: &[f64]) -> Result<Vec<(f64, f64)>> {
+        self.evaluate_kappa(time, t)?;
+        let factor = if let Conductivity::Number(k) = self.conductivity { k } else { 1.0 };
+        let mut circles = self.matrix.circles(self.pool, self.pair_kappa())?;
+        for ((radius, centre), inverse) in circles.iter_mut().zip(self.inverse_capacity) {
+            (*radius, *centre) = (*radius * factor * inverse, *centre * factor * inverse);
+        }
+        if let Some(surface) = self.surface {
+            surface.slopes(t, |i, slope| circles[i].1 += slope * self.inverse_capacity[i]);
+        }
+        Ok(circles)
+    }
+
+    pub fn kappa_is_constant(&self) -> bool {
+        !matches!(self.conductivity, Conductivity::Law(..) | Conductivity::Host(..))
+    }
+
+    fn pair_kappa(&self) -> Option<(Mean, &[f64])> {
+        match &self.conductivity {
+            Conductivity::Number(_) | Conductivity::Folded => None,
+            Conductivity::Field(kappa) => Some((self.mean, kappa)),
+            Conductivity::Law(_, kappa) | Conductivity::Host(_, kappa) => Some((self.mean, kappa)),
+        }
+    }
+
+    fn evaluate_kappa(&mut self, time: f64, t: &[f64]) -> Result<()> {
+        let kappa: &mut [f64] = match &mut self.conductivity {
+            Conductivity::Law(law, kappa) => {
+                self.pool.chunks(kappa, BLOCK, |start, part| {
+                    part.iter_mut().zip(&t[start..]).for_each(|(k, &t)| *k = law.at(t));
+                });
+                kappa
+            }
+            Conductivity::Host(host, kappa) => {
+                called("kappa", host(time, self.host, t, kappa))?;
+                kappa
+            }
+            _ => return Ok(()),
+        };
+        let bad = crate::sum::first(self.pool, kappa.len(), |i| !(kappa[i] >= 0.0 && kappa[i].is_finite()));
+        bad.map_or(Ok(()), |i| {
+            let value = format!("{} (at T = {})", kappa[i], t[i]);
+            Err(Error::bad_at("kappa", self.host[i] as usize, value, "it must be finite and not negative"))
+        })
+    }
+
+    fn release(&mut self, time: f64, t: &[f64], rate: &mut [f64]) -> Result<()> {
+        let source: &[f64] = match &mut self.release {
+            Release::None => return Ok(()),
+            Release::Field(source) => source,
+            Release::Host(host, buffer) => {
+                called("source", host(time, self.host, t, buffer))?;
+                buffer
+            }
+        };
+        let (volume, inverse) = (self.volume, self.inverse_capacity);
+        self.pool.chunks(rate, BLOCK, |start, part| {
+            for (k, rate) in part.iter_mut().enumerate() {
+                let i = start + k;
+                *rate += source[i] * volume[i] * inverse[i];
+            }
+        });
+        Ok(())
+    }
+}
+
+fn called(which: &str, code: i32) -> Result<()> {
+    if code == 0 { Ok(()) } else { Err(Error::CallbackFailed { which: which.into(), code }) }
+}

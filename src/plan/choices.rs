@@ -1,0 +1,139 @@
+//! The words that a solver is created with, read once.
+
+use super::rules::RULES;
+use crate::error::{Error, Result};
+use crate::integrator::{self, Method, Options};
+use crate::kernel::Kernel;
+use crate::model::MODELS;
+use crate::operator::{Mean, Operator, table};
+use crate::words::{Words, choice};
+
+/// Every word with its meaning and default, as `list words` prints it.
+pub static WORDS: &[(&str, &str)] = &[
+    ("dim", "dimensions: 1, 2 or 3 (default 3)"),
+    ("kernel", "M4, M5, M6, M7, M8, M6/2, C2, C4, C6, Lucy or Gaussian (default M6)"),
+    ("h_fac", "smoothing length over particle spacing (default: the kernel's own)"),
+    ("operator", "brookshaw, kernel or direct (default brookshaw)"),
+    ("normalise", "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own)"),
+    ("mean", "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic)"),
+    ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1 or rkl2 (default rkl2)"),
+    ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
+    ("max_stages", "most stages of rkl1 and rkl2 before a step is cut into sub-steps"),
+    ("bounds", "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)"),
+    ("max_applications", "most applications of the operator in one step (default 10000000)"),
+    ("threads", "worker threads; 0: as many as the process may use (default 0)"),
+    ("memory", "most bytes for weights, like 2e9 (default: what the machine has available)"),
+    ("without", "rules of the plan to switch off, separated by commas"),
+];
+
+pub struct Choices {
+    pub line: String,
+    pub kernel: Kernel,
+    pub h_fac: f64,
+    pub operator: &'static Operator,
+    pub normalise: bool,
+    pub mean: Mean,
+    pub method: &'static Method,
+    pub options: Options,
+    pub threads: usize,
+    pub memory: Option<u64>,
+    without: Vec<String>,
+}
+
+impl Choices {
+    /// Reads `heat dim=3 kernel=M6 …`.
+    ///
+    /// # Errors
+    /// `UnknownWord` or `BadValue` naming the word.
+    pub fn parse(line: &str) -> Result<Choices> {
+        let mut words = Words::parse("words", line)?;
+        let models: Vec<(&str, ())> = MODELS.iter().map(|m| (m.name, ())).collect();
+        choice("model", words.bare().unwrap_or("nothing"), &models)?;
+        let dim = words.count("dim", 1..=3)?.unwrap_or(3) as usize;
+        let kernel = Kernel::new(words.take("kernel").unwrap_or("M6"), dim)?;
+        let positive = |v: f64| v > 0.0 && v.is_finite();
+        let h_fac = words.number("h_fac", "h_fac must be positive", positive)?.unwrap_or(kernel.h_fac());
+        let operator = table::find(words.take("operator").unwrap_or("brookshaw"))?;
+        let normalise = match words.take("normalise") {
+            None => operator.normalise,
+            Some(word) => choice("normalise", word, &[("pair", true), ("none", false)])?,
+        };
+        let mean = Mean::find(words.take("mean").unwrap_or("harmonic"))?;
+        let method = integrator::find(words.take("integrator").unwrap_or("rkl2"))?;
+        let options = options(&mut words)?;
+        let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
+        let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
+        let without = without(words.take("without"))?;
+        words.done()?;
+        let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
+        Ok(Choices { line, kernel, h_fac, operator, normalise, mean, method, options, threads, memory, without })
+    }
+
+    /// Whether a rule is switched off.
+    pub fn without(&self, rule: &str) -> bool {
+        self.without.iter().any(|w| w == rule)
+    }
+}
+
+fn options(words: &mut Words) -> Result<Options> {
+    let mut options = Options { keep_bounds: true, max_applications: 10_000_000, ..Options::default() };
+    options.stages = words.count("stages", 1..=10_000)?.map(|s| s as u32);
+    if let Some(most) = words.count("max_stages", 3..=10_000)? {
+        options.max_stages = most as u32;
+    }
+    if let Some(word) = words.take("bounds") {
+        options.keep_bounds = choice("bounds", word, &[("keep", true), ("free", false)])?;
+    }
+    if let Some(most) = words.count("max_applications", 1..=u64::MAX)? {
+        options.max_applications = most;
+    }
+    Ok(options)
+}
+
+fn without(list: Option<&str>) -> Result<Vec<String>> {
+    let known = || RULES.iter().map(|r| r.name);
+    let names = list.into_iter().flat_map(|l| l.split(','));
+    names
+        .map(|name| match known().find(|k| *k == name) {
+            Some(rule) => Ok(rule.to_string()),
+            None => Err(Error::unknown("rule", name, known())),
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_choose_and_wrong_words_are_answered() {
+        let c = Choices::parse("heat  dim=2 kernel=c4 operator=kernel normalise=none integrator=euler without=same_h,frozen");
+        let c = c.unwrap();
+        assert_eq!((c.kernel.name(), c.kernel.dim(), c.operator.name, c.normalise), ("C4", 2, "kernel", false));
+        assert!(c.without("same_h") && !c.without("at_rest"));
+        for (line, expected) in [
+            ("", "unknown model"),
+            ("heet", "did you mean 'heat'"),
+            ("heat dim=4", "from 1 to 3"),
+            ("heat kernel=M9", "M4"),
+            ("heat kernl=M4", "did you mean 'kernel'"),
+            ("heat without=same", "same_h"),
+            ("heat h_fac=-1", "h_fac must be positive"),
+            ("heat dim=2 wall", "'wall'"),
+        ] {
+            let text = Choices::parse(line).err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(text.contains(expected), "{line}: {text}");
+        }
+    }
+
+    #[test]
+    fn every_documented_word_is_read() {
+        let values = [
+            "dim=2", "kernel=M4", "h_fac=1.2", "operator=kernel", "normalise=pair", "mean=geometric", "integrator=rkl1",
+            "stages=5", "max_stages=9", "bounds=free", "max_applications=7", "threads=1", "memory=1e9", "without=same_h",
+        ];
+        assert_eq!(values.len(), WORDS.len());
+        assert!(values.iter().zip(WORDS).all(|(v, (w, _))| v.split('=').next() == Some(w)));
+        assert!(Choices::parse(&format!("heat {}", values.join(" "))).is_ok());
+    }
+}

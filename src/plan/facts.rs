@@ -1,0 +1,49 @@
+//! What is known about a scene before it runs: the rules decide on these and on nothing else.
+
+use super::Choices;
+
+#[derive(Debug, Clone, PartialEq)]
+pub struct Facts {
+    pub n: usize,
+    pub dim: usize,
+    /// Mean number of neighbours, from a sample.
+    pub neighbours: f64,
+    pub same_h: bool,
+    /// h is found together with rho; or rho alone is summed.
+    pub finds_h: bool,
+    pub sums_rho: bool,
+    /// The host moved particles (or changed m, rho or h) after the first step.
+    pub moves: bool,
+    pub uniform_kappa: bool,
+    pub kappa_of_t: bool,
+    /// The host has changed kappa since the weights were made.
+    pub kappa_changes: bool,
+    /// Particles that exchange heat with the outside.
+    pub exchanging: usize,
+    pub heated: bool,
+    /// The operator has no negative weight.
+    pub positive: bool,
+    /// The integrator promises the maximum principle, and nothing heats.
+    pub keeps_bounds: bool,
+    pub operator: &'static str,
+    pub integrator: &'static str,
+    /// Arrays of n that the integrator holds.
+    pub buffers: f64,
+}
+
+impl Facts {
+    pub fn title(&self, choices: &Choices) -> String {
+        let normalised = if choices.normalise { "pair-normalised" } else { "not normalised" };
+        format!(
+            "heat: {} particles in {}-D, {:.0} neighbours; {} (h_fac {}), {} {normalised}, {} kappa, {}",
+            self.n,
+            self.dim,
+            self.neighbours,
+            choices.kernel.name(),
+            choices.h_fac,
+            self.operator,
+            choices.mean.name(),
+            self.integrator
+        )
+    }
+}

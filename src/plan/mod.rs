@@ -1,0 +1,146 @@
+//! From a scene to a list of passes: what runs, what was left out and why, in what memory.
+
+pub mod choices;
+pub mod facts;
+pub mod motion;
+pub mod prepare;
+pub mod report;
+pub mod rules;
+pub mod run;
+pub mod state;
+
+pub use choices::Choices;
+pub use facts::Facts;
+pub use report::Report;
+pub use state::State;
+
+use rules::{RULES, Rule};
+use std::fmt;
+
+/// How often a pass runs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum When {
+    Once,
+    EachStep,
+    EachStage,
+}
+
+/// One pass of the plan, with what it holds and touches.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Pass {
+    pub name: &'static str,
+    pub about: String,
+    pub when: When,
+    /// Memory that the pass's product holds.
+    pub bytes: f64,
+    /// Pairs that it visits, both directions counted.
+    pub pairs: f64,
+}
+
+/// What a scene compiles to.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Plan {
+    pub title: String,
+    pub passes: Vec<Pass>,
+    /// Rules that hold for this scene: what they leave out is not done.
+    pub left_out: Vec<&'static Rule>,
+    /// Rules that would hold, switched off by `without=`.
+    pub disabled: Vec<&'static Rule>,
+}
+
+impl Plan {
+    /// Compiles the plan of a scene.
+    pub fn new(choices: &Choices, facts: &Facts) -> Plan {
+        let (disabled, left_out): (Vec<_>, Vec<_>) =
+            RULES.iter().filter(|r| (r.holds)(facts)).partition(|r| choices.without(r.name));
+        let mut plan = Plan { title: facts.title(choices), passes: Vec::new(), left_out, disabled };
+        plan.passes = plan.list(choices, facts);
+        plan
+    }
+
+    /// Whether a rule holds here and is not switched off.
+    pub fn leaves_out(&self, rule: &str) -> bool {
+        self.left_out.iter().any(|r| r.name == rule)
+    }
+
+    fn list(&self, choices: &Choices, facts: &Facts) -> Vec<Pass> {
+        let (n, pairs) = (facts.n as f64, facts.n as f64 * facts.neighbours);
+        let setup = if self.leaves_out("at_rest") { When::Once } else { When::EachStep };
+        let mut list = Vec::new();
+        let mut add = |name, when, bytes, pairs, about: String| list.push(Pass { name, about, when, bytes, pairs });
+        add("sort", setup, n * (8.0 * facts.dim as f64 + 4.0), 0.0, "particles along a Morton curve".into());
+        if facts.finds_h || facts.sums_rho {
+            let what = if facts.finds_h { "rho and h together" } else { "rho by summation" };
+            add("density", setup, 16.0 * n, pairs, what.into());
+        }
+        let evaluations = if self.leaves_out("same_h") { "one kernel evaluation" } else { "two kernel evaluations" };
+        add("weights", setup, pairs * 12.0 + 4.0 * n, pairs, format!("{} w_ab, {evaluations} per pair", facts.operator));
+        if choices.normalise {
+            add("normalise", setup, 8.0 * n, pairs, "pairs scaled by the mean of 1/K_a and 1/K_b".into());
+        }
+        if self.leaves_out("frozen") && !self.leaves_out("uniform_kappa") {
+            add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", choices.mean.name()));
+        }
+        let bound_when = if facts.kappa_of_t { When::EachStep } else { setup };
+        add("bound", bound_when, 0.0, pairs, "Gershgorin's circles; power iteration where it saves stages".into());
+        if facts.kappa_of_t {
+            add("kappa", When::EachStage, 8.0 * n, 0.0, "kappa(T)".into());
+        }
+        add("stages", When::EachStage, facts.buffers * 8.0 * n, pairs, format!("{}: rows of weights", facts.integrator));
+        if !self.leaves_out("no_wall") {
+            add("surface", When::EachStage, 48.0 * facts.exchanging as f64, 0.0, "exchange with the outside".into());
+        }
+        if !self.leaves_out("no_source") {
+            add("source", When::EachStage, 8.0 * n, 0.0, "heat released in the volume".into());
+        }
+        let mut promises = vec!["finite"];
+        if facts.keeps_bounds {
+            promises.push("within the bounds of before");
+        }
+        if !self.leaves_out("positive") {
+            promises.push("no growth");
+        }
+        add("check", When::EachStep, 0.0, 0.0, promises.join(", "));
+        add("commit", When::EachStep, 0.0, 0.0, "the new state replaces the old".into());
+        list
+    }
+}
+
+impl fmt::Display for Plan {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        writeln!(f, "{}", self.title)?;
+        for pass in &self.passes {
+            let when = match pass.when {
+                When::Once => "once",
+                When::EachStep => "each step",
+                When::EachStage => "each stage",
+            };
+            let size = |v: f64, unit: &str| if v == 0.0 { String::new() } else { format!("{} {unit}", readable(v)) };
+            let (bytes, pairs) = (size(pass.bytes, "B"), size(pass.pairs, "pairs"));
+            let line = format!("  {when:<11}{:<10}{bytes:>9} {pairs:>12}  {}", pass.name, pass.about);
+            writeln!(f, "{}", line.trim_end())?;
+        }
+        let mut section = |title: &str, rules: &[&Rule]| -> fmt::Result {
+            if rules.is_empty() {
+                return Ok(());
+            }
+            writeln!(f, "{title}")?;
+            for rule in rules {
+                let exact = if rule.exact { "same bits" } else { "same to rounding" };
+                writeln!(f, "  {:<14}{} ({exact})", rule.name, rule.reason)?;
+            }
+            Ok(())
+        };
+        section("left out", &self.left_out)?;
+        section("could be left out, but without= says no", &self.disabled)
+    }
+}
+
+/// 1234567 as `1.2 M`.
+pub fn readable(v: f64) -> String {
+    let scales = [(1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k")];
+    match scales.iter().find(|(scale, _)| v >= *scale) {
+        Some((scale, unit)) => format!("{:.1}{unit}", v / scale),
+        None => format!("{v:.0}"),
+    }
+}

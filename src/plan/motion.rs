@@ -1,0 +1,143 @@
+//! The stages of a step: bounds on the operator, the schedule that follows from them, sub-steps on a private copy of T.
+
+use super::report::{Report, Timers};
+use super::state::Progress;
+use super::{Choices, Plan};
+use crate::error::{Error, Result};
+use crate::integrator::{self, Bounds, Method, Schedule, System, Work};
+use crate::memory;
+use crate::model::heat::Heat;
+use crate::operator::spectrum;
+use crate::pool::{BLOCK, Pool};
+use crate::sum;
+use std::time::Instant;
+
+/// A prepared right-hand side and what it takes to move it.
+pub struct Motion<'a> {
+    pub heat: Heat<'a>,
+    pub pool: &'a Pool,
+    pub choices: &'a Choices,
+    pub plan: &'a Plan,
+    pub work: &'a mut Work,
+    pub progress: &'a mut Option<Progress>,
+    pub timers: &'a mut Timers,
+    /// Refined bounds that still hold.
+    pub known: &'a mut Option<Bounds>,
+}
+
+impl System for Heat<'_> {
+    fn rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<()> {
+        Heat::rate(self, t, y, dy)
+    }
+}
+
+/// The largest explicit Euler step that is stable under these bounds; infinite where nothing diffuses.
+pub fn explicit_limit(bounds: Bounds) -> f64 {
+    2.0 / bounds.spectral
+}
+
+impl Motion<'_> {
+    /// Advances `t` by exactly `dt` from `time`. Where the operator changes with T, bounds and schedule are made anew
+    /// for each sub-step.
+    pub fn advance(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        let mut done = 0.0;
+        while done < dt && !t.is_empty() {
+            let bounds = self.bounds(time + done, dt - done, t)?;
+            let (method, schedule) = self.schedule(dt - done, bounds)?;
+            if report.substeps == 0 {
+                report.limit = explicit_limit(bounds);
+            }
+            report.stages = schedule.stages.into();
+            let start = Instant::now();
+            let steps = if self.is_linear() { schedule.substeps } else { 1 };
+            for k in 0..steps {
+                let now = time + done + schedule.start(k);
+                method.advance(&schedule, &mut self.heat, self.pool, now, t, self.work)?;
+                report.substeps += 1;
+                self.tell(time, dt, done + schedule.start(k + 1))?;
+            }
+            self.timers.add("stages", start.elapsed());
+            done = if steps == schedule.substeps { dt } else { done + schedule.start(steps) };
+        }
+        Ok(())
+    }
+
+    /// Whether the operator stays the same while T changes.
+    fn is_linear(&self) -> bool {
+        self.heat.kappa_is_constant() && self.heat.surface.is_none_or(|s| s.is_linear())
+    }
+
+    fn schedule(&self, dt: f64, bounds: Bounds) -> Result<(&'static Method, Schedule)> {
+        let (method, options) = (self.choices.method, &self.choices.options);
+        if self.plan.leaves_out("one_stage") && options.stages.is_none() && dt <= explicit_limit(bounds) {
+            let euler = integrator::find("euler")?;
+            return Ok((euler, euler.schedule(dt, bounds, options)?));
+        }
+        Ok((method, method.schedule(dt, bounds, options)?))
+    }
+
+    /// Bounds that are good enough for a step of `dt`.
+    fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
+        if let Some(bounds) = self.known.filter(|_| self.is_linear()) {
+            return Ok(bounds);
+        }
+        let start = Instant::now();
+        let mut bounds = self.proven_bounds(time, t)?;
+        if !(self.plan.leaves_out("proven_bound") && self.is_least_work(dt, bounds)?) {
+            bounds = self.refine(bounds, t)?;
+            *self.known = Some(bounds).filter(|_| self.is_linear());
+        }
+        self.timers.add("bound", start.elapsed());
+        Ok(bounds)
+    }
+
+    /// A bound of zero shows the least work there can be; a bound that asks for no more need not be refined.
+    fn is_least_work(&self, dt: f64, bounds: Bounds) -> Result<bool> {
+        let (method, options) = (self.choices.method, &self.choices.options);
+        let least = method.schedule(dt, Bounds { spectral: 0.0, diagonal: 0.0 }, options)?;
+        Ok(method.schedule(dt, bounds, options).is_ok_and(|s| s.applications() <= least.applications()))
+    }
+
+    /// Gershgorin's bounds: proven, for any operator and any kappa.
+    pub fn proven_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+        let circles = self.heat.circles(time, t)?;
+        let largest = |of: fn(&(f64, f64)) -> f64| sum::max(self.pool, circles.len(), |i| of(&circles[i])).max(0.0);
+        let bounds = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
+        match bounds.spectral.is_finite() {
+            true => Ok(bounds),
+            false => Err(Error::bad("kappa", "too large", "its product with the pair weights exceeds all numbers")),
+        }
+    }
+
+    /// The same, lowered by power iteration. Exchange with the surroundings is linearised.
+    pub fn refine(&mut self, proven: Bounds, t: &[f64]) -> Result<Bounds> {
+        if proven.spectral == 0.0 {
+            return Ok(proven);
+        }
+        let (heat, pool) = (&mut self.heat, self.pool);
+        let capacity = |&inverse: &f64| if inverse > 0.0 { 1.0 / inverse } else { 0.0 };
+        let weight = memory::collected("capacities", heat.inverse_capacity.iter().map(capacity))?;
+        let mut slopes = memory::filled("slopes", if heat.surface.is_some() { t.len() } else { 0 }, 0.0)?;
+        if let Some(surface) = heat.surface {
+            surface.slopes(t, |i, slope| slopes[i] = slope * heat.inverse_capacity[i]);
+        }
+        let mut applications = 0;
+        let spectral = spectrum::largest(pool, &weight, proven.spectral, |x, y| {
+            applications += 1;
+            heat.diffuse(x, y);
+            pool.chunks(&mut y[..slopes.len()], BLOCK, |start, part| {
+                part.iter_mut().enumerate().for_each(|(k, y)| *y -= slopes[start + k] * x[start + k]);
+            });
+            Ok(())
+        })?;
+        self.heat.applications += applications;
+        Ok(Bounds { spectral, ..proven })
+    }
+
+    fn tell(&mut self, time: f64, dt: f64, done: f64) -> Result<()> {
+        match self.progress.as_mut().map_or(0, |progress| progress(time + done, done / dt)) {
+            0 => Ok(()),
+            _ => Err(Error::Cancelled),
+        }
+    }
+}

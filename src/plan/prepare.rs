@@ -1,0 +1,270 @@
+//! The passes that make what the stages need: sort, density, weights, normalise, fold, capacity, surface, bound. Each
+//! runs only where its product is missing.
+
+use super::state::{Geometry, Input, State, Weights};
+use super::Plan;
+use super::motion::Motion;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::model::fields::{self, FIELDS, Slot};
+use crate::model::heat::{Conductivity, Heat, Release};
+use crate::model::surface::{Exchange, Surface};
+use crate::operator::Assembly;
+use crate::space::{Cloud, density, rows::Rows};
+use std::borrow::Cow;
+
+/// K_a below which a particle counts as having too few neighbours for its weights to be normalised: scaling them up
+/// by more than this would make a lone pair as stiff as it is meaningless.
+const LEAST_MOMENT: f64 = 0.1;
+
+/// One block in this many is looked at to estimate the number of neighbours.
+const SAMPLE: usize = 16;
+
+impl State {
+    /// The plan of the scene as it stands.
+    ///
+    /// # Errors
+    /// As [`State::prepare_geometry`].
+    pub fn plan(&mut self) -> Result<Plan> {
+        self.prepare_geometry("plan")?;
+        Ok(Plan::new(&self.choices, &self.facts()))
+    }
+
+    /// Everything that a right-hand side needs.
+    ///
+    /// # Errors
+    /// `OutOfOrder` naming what is missing, `BoxTooSmall`, `NoMemory`, `BadElement` naming a particle.
+    pub fn prepare(&mut self, call: &str) -> Result<Plan> {
+        self.cloud(call)?;
+        for slot in [fields::T, fields::M] {
+            self.need(slot, call)?;
+        }
+        if !self.kappa_of_t() {
+            self.need(fields::KAPPA, call)?;
+        }
+        let plan = self.plan()?;
+        self.prepare_weights(&plan)?;
+        self.fold_kappa(&plan)?;
+        self.prepare_capacity()?;
+        self.prepare_surface(&plan)?;
+        Ok(plan)
+    }
+
+    fn need(&self, slot: Slot, call: &str) -> Result<()> {
+        let set = self.inputs[slot] != Input::Unset || self.is_empty();
+        let missing = || format!("{} ({})", FIELDS[slot].name, FIELDS[slot].about);
+        if set { Ok(()) } else { Err(Error::OutOfOrder { call: call.into(), missing: missing() }) }
+    }
+
+    /// Smoothing lengths, densities and volumes, given or computed, on cells that fit them.
+    pub fn prepare_geometry(&mut self, call: &str) -> Result<()> {
+        if self.geometry.is_some() {
+            return Ok(());
+        }
+        self.cloud(call)?;
+        self.need(fields::M, call)?;
+        let start = std::time::Instant::now();
+        if self.inputs[fields::H] == Input::Unset && self.inputs[fields::RHO] == Input::Unset {
+            // h is not known before the search that finds it: sort on the finest grid, find h, sort again.
+            let m = self.each(fields::M)?;
+            let cloud = self.cloud(call)?;
+            let h = density::smoothing_lengths(&self.choices.kernel, self.choices.h_fac, cloud, &m, &self.pool)?;
+            self.inputs[fields::H] = Input::Each(h);
+            let made = self.make_geometry(call);
+            self.inputs[fields::H] = Input::Unset;
+            self.geometry = Some(made?);
+            self.timers.add("density", start.elapsed());
+        } else {
+            self.geometry = Some(self.make_geometry(call)?);
+            self.timers.add("sort", start.elapsed());
+        }
+        Ok(())
+    }
+
+    fn make_geometry(&mut self, call: &str) -> Result<Geometry> {
+        let (nu, radius) = (self.dim() as f64, self.choices.kernel.radius());
+        let mut h = self.lengths(nu)?;
+        let reach = radius * h.iter().copied().fold(0.0, f64::max);
+        if !fits(self.cloud(call)?, reach) && reach.is_finite() {
+            self.sort_again(reach)?;
+            h = self.lengths(nu)?;
+        }
+        let m = self.each(fields::M)?;
+        let cloud = self.cloud(call)?;
+        let rows = Rows::new(cloud, &h, radius, &self.pool)?;
+        let rho = match &self.inputs[fields::RHO] {
+            Input::Unset => density::sum(&self.choices.kernel, &rows, &m, &self.pool)?,
+            _ => self.each(fields::RHO)?,
+        };
+        let (same_h, neighbours) = (rows.same_h(), rows.mean_neighbours(&self.pool, SAMPLE)?);
+        let volume = memory::collected("volumes", m.iter().zip(&rho).map(|(m, rho)| m / rho))?;
+        Ok(Geometry { h, rho, volume, same_h, neighbours })
+    }
+
+    /// h as given, or h_fac (m/rho)^(1/nu).
+    fn lengths(&self, nu: f64) -> Result<Vec<f64>> {
+        if self.inputs[fields::H] != Input::Unset {
+            return self.each(fields::H);
+        }
+        let (m, rho) = (self.each(fields::M)?, self.each(fields::RHO)?);
+        memory::collected("h", m.iter().zip(&rho).map(|(m, rho)| self.choices.h_fac * (m / rho).powf(1.0 / nu)))
+    }
+
+    /// An input as an array; a number is repeated.
+    pub fn each(&self, slot: Slot) -> Result<Vec<f64>> {
+        match self.inputs[slot].view(self.len())? {
+            Cow::Borrowed(v) => memory::copied(FIELDS[slot].name, v),
+            Cow::Owned(v) => Ok(v),
+        }
+    }
+
+    /// Calls `work` with the rows and the assembly of the operator.
+    pub fn with_assembly<T>(&self, same_h: bool, work: impl FnOnce(&Assembly) -> Result<T>) -> Result<T> {
+        let Some(g) = &self.geometry else {
+            return Err(Error::OutOfOrder { call: "weights".into(), missing: "set_particles".into() });
+        };
+        let rows = Rows::new(self.cloud("weights")?, &g.h, self.choices.kernel.radius(), &self.pool)?;
+        let (operator, kernel) = (self.choices.operator, &self.choices.kernel);
+        work(&Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h })
+    }
+
+    fn prepare_weights(&mut self, plan: &Plan) -> Result<()> {
+        if self.weights.is_some() {
+            return Ok(());
+        }
+        self.refuse_what_does_not_fit()?;
+        let start = std::time::Instant::now();
+        let (mut matrix, moments) = self.with_assembly(plan.leaves_out("same_h"), |a| a.store(&self.pool))?;
+        self.timers.add("weights", start.elapsed());
+        if self.choices.normalise {
+            let inverse = memory::collected("normalisation", moments.iter().map(|&k| 1.0 / k.max(LEAST_MOMENT)))?;
+            self.timers.time("normalise", || {
+                matrix.scale(&self.pool, |a, b| 0.5 * (inverse[a] + inverse[b]));
+            });
+        }
+        if let (Some(i), Some(cloud)) = (matrix.first_bad(&self.pool), &self.cloud) {
+            let what = "a pair weight".to_string();
+            return Err(Error::NotFinite { what, index: cloud.host[i] as usize, value: f64::NAN });
+        }
+        self.weights = Some(Weights { matrix, moments, folded: false });
+        Ok(())
+    }
+
+    fn refuse_what_does_not_fit(&self) -> Result<()> {
+        let neighbours = self.geometry.as_ref().map_or(0.0, |g| g.neighbours);
+        let bytes = (neighbours * self.len() as f64 * 12.0) as u64;
+        let available = self.choices.memory.unwrap_or_else(memory::available);
+        if bytes <= available {
+            return Ok(());
+        }
+        let what = format!("weights of {neighbours:.0} neighbours for each of {} particles", self.len());
+        Err(Error::NoMemory { what, bytes, available })
+    }
+
+    fn fold_kappa(&mut self, plan: &Plan) -> Result<()> {
+        let fold = plan.leaves_out("frozen") && !plan.leaves_out("uniform_kappa");
+        let kappa = if fold { self.each(fields::KAPPA)? } else { Vec::new() };
+        let (pool, mean) = (&self.pool, self.choices.mean);
+        if let Some(weights) = self.weights.as_mut().filter(|w| fold && !w.folded) {
+            self.timers.time("fold", || weights.matrix.scale(pool, |a, b| mean.of(kappa[a], kappa[b])));
+            weights.folded = true;
+        }
+        Ok(())
+    }
+
+    fn prepare_capacity(&mut self) -> Result<()> {
+        if self.inverse_capacity.is_some() {
+            return Ok(());
+        }
+        let (m, c_v, fixed) = (&self.inputs[fields::M], &self.inputs[fields::C_V], &self.inputs[fields::FIXED]);
+        let inverse = |i: usize| match (m.at(i), c_v.at(i), fixed.at(i)) {
+            (Some(m), Some(c_v), Some(0.0)) => 1.0 / (m * c_v),
+            _ => 0.0,
+        };
+        self.inverse_capacity = Some(memory::collected("capacities", (0..self.len()).map(inverse))?);
+        Ok(())
+    }
+
+    fn prepare_surface(&mut self, plan: &Plan) -> Result<()> {
+        if plan.leaves_out("no_wall") {
+            self.surface = None;
+        }
+        if plan.leaves_out("no_wall") || self.surface.is_some() {
+            return Ok(());
+        }
+        let Some(g) = &self.geometry else { return Ok(()) };
+        let nu = self.dim() as f64;
+        let value = |slot: Slot, i: usize| self.inputs[slot].at(i).unwrap_or(0.0);
+        let exchange = |i: usize| Exchange {
+            area: self.inputs[fields::AREA].at(i).unwrap_or_else(|| g.volume[i].powf((nu - 1.0) / nu)),
+            flux_in: value(fields::FLUX_IN, i),
+            h_conv: value(fields::H_CONV, i),
+            emissivity: value(fields::EMISSIVITY, i),
+            t_ambient: value(fields::T_AMBIENT, i),
+        };
+        self.surface = Some(Surface::new(self.len(), self.sigma_sb, self.choices.without("no_wall"), exchange)?);
+        Ok(())
+    }
+
+    /// Calls `work` with the right-hand side and what it takes to move it. Needs [`State::prepare`].
+    pub fn with_motion<T>(&mut self, plan: &Plan, work: impl FnOnce(&mut Motion) -> Result<T>) -> Result<T> {
+        let n = self.len();
+        let uniform = plan.leaves_out("uniform_kappa");
+        let mut evaluated = memory::filled("kappa", if self.kappa_of_t() { n } else { 0 }, 0.0)?;
+        let mut released = memory::filled("source", if self.source_host.is_some() { n } else { 0 }, 0.0)?;
+        let (Some(weights), Some(g), Some(cloud), Some(inverse_capacity)) =
+            (&self.weights, &self.geometry, &self.cloud, &self.inverse_capacity)
+        else {
+            return Err(Error::OutOfOrder { call: "rate".into(), missing: "set_particles".into() });
+        };
+        let each = |slot: Slot, wanted: bool| self.inputs[slot].view(if wanted { n } else { 0 });
+        let by_pair = !uniform && !self.law.is_some() && self.kappa_host.is_none() && !weights.folded;
+        let kappa = each(fields::KAPPA, by_pair)?;
+        let source = each(fields::SOURCE, !plan.leaves_out("no_source"))?;
+        let conductivity = match (&mut self.kappa_host, &self.law, &self.inputs[fields::KAPPA]) {
+            (Some(host), ..) => Conductivity::Host(host, &mut evaluated),
+            (None, Some(law), _) => Conductivity::Law(law, &mut evaluated),
+            (None, None, Input::Number(k)) if uniform => Conductivity::Number(*k),
+            _ if weights.folded => Conductivity::Folded,
+            _ => Conductivity::Field(&kappa),
+        };
+        let release = match &mut self.source_host {
+            Some(host) => Release::Host(host, &mut released),
+            None if plan.leaves_out("no_source") => Release::None,
+            None => Release::Field(&source),
+        };
+        let heat = Heat {
+            pool: &self.pool,
+            matrix: &weights.matrix,
+            mean: self.choices.mean,
+            inverse_capacity,
+            conductivity,
+            surface: self.surface.as_ref(),
+            release,
+            volume: &g.volume,
+            host: &cloud.host,
+            quiet: plan.leaves_out("quiet_rows"),
+            cancel: &self.cancel,
+            applications: 0,
+        };
+        let mut motion = Motion {
+            heat,
+            pool: &self.pool,
+            choices: &self.choices,
+            plan,
+            work: &mut self.work,
+            progress: &mut self.progress,
+            timers: &mut self.timers,
+            known: &mut self.bounds,
+        };
+        let result = work(&mut motion);
+        self.applications += motion.heat.applications;
+        result
+    }
+}
+
+/// Whether the cloud's cells suit a search that reaches this far: not much more than a cell, and not much less.
+fn fits(cloud: &Cloud, reach: f64) -> bool {
+    let doublings = (reach / cloud.grid.edge).log2();
+    cloud.is_empty() || reach == 0.0 || (doublings - doublings.round()).abs() < 0.06
+}

@@ -1,0 +1,51 @@
+//! What a step did, and what it took.
+
+use std::time::{Duration, Instant};
+
+/// Of one step, and where the time went since the solver was created.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Report {
+    pub time: f64,
+    pub dt: f64,
+    pub substeps: u64,
+    /// Stages of the last sub-step.
+    pub stages: u64,
+    /// Applications of the operator, those of the power iteration included.
+    pub applications: u64,
+    /// Largest stable explicit step, s.
+    pub limit: f64,
+    pub t_min: f64,
+    pub t_max: f64,
+    /// Σ m c_v T before and after, J.
+    pub energy_before: f64,
+    pub energy: f64,
+    pub seconds: f64,
+}
+
+/// Seconds per pass, summed over the life of a solver.
+#[derive(Debug, Clone, Default)]
+pub struct Timers {
+    list: Vec<(&'static str, Duration)>,
+}
+
+impl Timers {
+    /// Runs a pass on the clock of its name.
+    pub fn time<T>(&mut self, pass: &'static str, work: impl FnOnce() -> T) -> T {
+        let start = Instant::now();
+        let result = work();
+        self.add(pass, start.elapsed());
+        result
+    }
+
+    pub fn add(&mut self, pass: &'static str, spent: Duration) {
+        match self.list.iter_mut().find(|(name, _)| *name == pass) {
+            Some((_, total)) => *total += spent,
+            None => self.list.push((pass, spent)),
+        }
+    }
+
+    /// Passes in the order in which they first ran, with seconds.
+    pub fn seconds(&self) -> impl Iterator<Item = (&'static str, f64)> {
+        self.list.iter().map(|(name, spent)| (*name, spent.as_secs_f64()))
+    }
+}

@@ -1,0 +1,137 @@
+//! One step: prepare, stages on a private copy, check, commit. A step that fails has changed nothing.
+
+use super::motion::explicit_limit;
+use super::state::{Input, State};
+use super::{Plan, Report};
+use crate::error::{Error, Result};
+use crate::integrator::Bounds;
+use crate::memory;
+use crate::model::fields::{self, Slot};
+use crate::sum;
+use std::sync::atomic::Ordering;
+use std::time::Instant;
+
+/// How far, relative to the largest |T|, rounding may carry a value over a bound that the method keeps.
+const ROUNDING: f64 = 1e-12;
+
+/// What is true of T before a step, to be compared with after.
+struct Before {
+    low: f64,
+    high: f64,
+    spread: f64,
+}
+
+impl State {
+    /// Advances T by exactly `dt`.
+    ///
+    /// # Errors
+    /// `BadValue` for a dt that is negative or not finite; any error of [`State::prepare`]; `StepTooLarge`,
+    /// `NotFinite`, `OutOfBounds`, `Growth`, `Cancelled`, `CallbackFailed`. The state is as it was in every case.
+    pub fn step(&mut self, dt: f64) -> Result<Report> {
+        if !(dt >= 0.0 && dt.is_finite()) {
+            return Err(Error::bad("dt", dt, "a step must be finite and not negative"));
+        }
+        self.cancel.store(false, Ordering::Relaxed);
+        let start = Instant::now();
+        if self.choices.without("at_rest") && self.steps > 0 {
+            self.drop_geometry();
+        }
+        let plan = self.prepare("step")?;
+        let (mut t, time, applications) = (self.each(fields::T)?, self.time, self.applications);
+        let before = self.before(&plan, &t);
+        let mut report = Report { dt, energy_before: self.energy(&t), ..Report::default() };
+        self.with_motion(&plan, |motion| motion.advance(time, dt, &mut t, &mut report))?;
+        let checked = Instant::now();
+        self.check(&plan, &before, &t)?;
+        (report.t_min, report.t_max) = self.extrema(&t);
+        report.energy = self.energy(&t);
+        self.timers.add("check", checked.elapsed());
+
+        self.inputs[fields::T] = Input::Each(t);
+        self.time += dt;
+        self.steps += 1;
+        report.time = self.time;
+        report.applications = self.applications - applications;
+        report.seconds = start.elapsed().as_secs_f64();
+        Ok(report)
+    }
+
+    /// dT/dt now.
+    pub fn rate(&mut self) -> Result<Vec<f64>> {
+        let plan = self.prepare("rate")?;
+        let (t, time) = (self.each(fields::T)?, self.time);
+        let mut rate = memory::filled("rate", t.len(), 0.0)?;
+        self.with_motion(&plan, |motion| motion.heat.rate(time, &t, &mut rate))?;
+        Ok(rate)
+    }
+
+    /// Bounds on the operator now, refined by power iteration.
+    pub fn bounds(&mut self) -> Result<Bounds> {
+        let plan = self.prepare("limit")?;
+        let (t, time) = (self.each(fields::T)?, self.time);
+        self.with_motion(&plan, |motion| {
+            let proven = motion.proven_bounds(time, &t)?;
+            motion.refine(proven, &t)
+        })
+    }
+
+    /// The largest stable explicit Euler step now; infinite where nothing diffuses.
+    pub fn limit(&mut self) -> Result<f64> {
+        Ok(explicit_limit(self.bounds()?))
+    }
+
+    /// Σ m c_v T.
+    pub fn energy(&self, t: &[f64]) -> f64 {
+        let inputs = &self.inputs;
+        let value = |slot: Slot, i: usize| inputs[slot].at(i).unwrap_or(0.0);
+        sum::sum(&self.pool, t.len(), |i| value(fields::M, i) * value(fields::C_V, i) * t[i])
+    }
+
+    /// The smallest and the largest value.
+    pub fn extrema(&self, t: &[f64]) -> (f64, f64) {
+        (sum::min(&self.pool, t.len(), |i| t[i]), sum::max(&self.pool, t.len(), |i| t[i]))
+    }
+
+    fn before(&self, plan: &Plan, t: &[f64]) -> Before {
+        let (low, high) = self.extrema(t);
+        Before { low, high, spread: if self.may_grow(plan) { self.spread(t) } else { 0.0 } }
+    }
+
+    /// Whether the norm of T is to be checked: nothing heats, and the operator does not rule growth out.
+    fn may_grow(&self, plan: &Plan) -> bool {
+        let isolated = self.exchanging() == 0 && !self.heated() && self.inputs[fields::FIXED] == Input::Number(0.0);
+        isolated && !plan.leaves_out("positive")
+    }
+
+    /// The norm of T − mean(T), weighted by capacity: what diffusion can only lower.
+    fn spread(&self, t: &[f64]) -> f64 {
+        let Some(inverse) = &self.inverse_capacity else { return 0.0 };
+        let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
+        let total = sum::sum(&self.pool, t.len(), weight);
+        let mean = sum::sum(&self.pool, t.len(), |i| weight(i) / total * t[i]);
+        sum::sum(&self.pool, t.len(), |i| weight(i) / total * (t[i] - mean) * (t[i] - mean)).sqrt()
+    }
+
+    fn check(&self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
+        let host = |i: usize| self.cloud.as_ref().map_or(i, |c| c.host[i] as usize);
+        if let Some(i) = sum::first(&self.pool, t.len(), |i| !t[i].is_finite()) {
+            return Err(Error::NotFinite { what: "T".into(), index: host(i), value: t[i] });
+        }
+        let slack = ROUNDING * before.high.abs().max(before.low.abs());
+        if self.may_grow(plan) {
+            let after = self.spread(t);
+            if after > before.spread * (1.0 + 1e-9) + slack {
+                let operator = self.choices.operator.name.into();
+                return Err(Error::Growth { before: before.spread, after, operator });
+            }
+        }
+        if self.facts().keeps_bounds {
+            let (low, high) = (before.low - slack, before.high + slack);
+            if let Some(i) = sum::first(&self.pool, t.len(), |i| t[i] < low || t[i] > high) {
+                let promise = format!("{} with bounds=keep", self.choices.method.name);
+                return Err(Error::OutOfBounds { index: host(i), value: t[i], low, high, promise });
+            }
+        }
+        Ok(())
+    }
+}

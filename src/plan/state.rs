@@ -1,0 +1,331 @@
+//! Everything that a solver holds: what the host handed over, and what was derived from it, each derived thing present
+//! or absent. A setter drops what it invalidates; `prepare` makes what is missing.
+
+use super::report::Timers;
+use super::{Choices, Facts};
+use crate::array::Strided;
+use crate::error::{Error, Result};
+use crate::integrator::{Bounds, Work};
+use crate::memory;
+use crate::model::conductivity::Law;
+use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
+use crate::model::heat::Callback;
+use crate::model::surface::Surface;
+use crate::operator::Matrix;
+use crate::pool::Pool;
+use crate::space::{Cloud, Domain};
+use std::borrow::Cow;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// An input: one number for all, or one per particle in internal order.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub enum Input {
+    #[default]
+    Unset,
+    Number(f64),
+    Each(Vec<f64>),
+}
+
+impl Input {
+    fn default_of(slot: Slot) -> Input {
+        match FIELDS[slot].access {
+            Access::Input { default: Some(v), .. } => Input::Number(v),
+            _ => Input::Unset,
+        }
+    }
+
+    pub fn at(&self, i: usize) -> Option<f64> {
+        match self {
+            Input::Unset => None,
+            Input::Number(v) => Some(*v),
+            Input::Each(v) => v.get(i).copied(),
+        }
+    }
+
+    /// As an array of n; one that is held is borrowed, a number is repeated.
+    pub fn view(&self, n: usize) -> Result<Cow<'_, [f64]>> {
+        match self {
+            Input::Each(v) => Ok(Cow::Borrowed(v)),
+            Input::Number(v) => Ok(Cow::Owned(memory::filled("particle data", n, *v)?)),
+            Input::Unset => Ok(Cow::Owned(memory::filled("particle data", n, 0.0)?)),
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        if let Input::Each(v) = self { memory::bytes(v) } else { 0 }
+    }
+}
+
+/// What follows from positions, masses, densities and smoothing lengths; internal order.
+pub struct Geometry {
+    pub h: Vec<f64>,
+    pub rho: Vec<f64>,
+    pub volume: Vec<f64>,
+    pub same_h: bool,
+    /// Mean number of neighbours, from a sample.
+    pub neighbours: f64,
+}
+
+/// The stored operator.
+pub struct Weights {
+    pub matrix: Matrix,
+    /// K_a before normalisation.
+    pub moments: Vec<f64>,
+    /// The averages of kappa are in the coefficients.
+    pub folded: bool,
+}
+
+/// Called between sub-steps with the time reached and the share of the step done; not 0 cancels.
+pub type Progress = Box<dyn FnMut(f64, f64) -> i32 + Send>;
+
+pub struct State {
+    pub choices: Choices,
+    pub pool: Pool,
+    pub domain: Domain,
+    pub time: f64,
+    pub sigma_sb: f64,
+    pub cloud: Option<Cloud>,
+    pub inputs: [Input; INPUTS],
+    pub law: Option<Law>,
+    pub kappa_host: Option<Callback>,
+    pub source_host: Option<Callback>,
+    pub progress: Option<Progress>,
+    pub cancel: Arc<AtomicBool>,
+
+    pub geometry: Option<Geometry>,
+    pub weights: Option<Weights>,
+    pub inverse_capacity: Option<Vec<f64>>,
+    pub surface: Option<Surface>,
+    pub bounds: Option<Bounds>,
+
+    /// Steps taken, and whether particles or kappa changed after the first.
+    pub steps: u64,
+    pub moves: bool,
+    pub kappa_changes: bool,
+    pub timers: Timers,
+    pub work: Work,
+    pub applications: u64,
+}
+
+impl State {
+    pub fn new(choices: Choices) -> Result<State> {
+        Ok(State {
+            pool: Pool::new(choices.threads)?,
+            domain: Domain::open(choices.kernel.dim()),
+            time: 0.0,
+            sigma_sb: fields::SIGMA_SB,
+            cloud: None,
+            inputs: std::array::from_fn(Input::default_of),
+            law: None,
+            kappa_host: None,
+            source_host: None,
+            progress: None,
+            cancel: Arc::default(),
+            geometry: None,
+            weights: None,
+            inverse_capacity: None,
+            surface: None,
+            bounds: None,
+            steps: 0,
+            moves: false,
+            kappa_changes: false,
+            timers: Timers::default(),
+            work: Work::default(),
+            applications: 0,
+            choices,
+        })
+    }
+
+    pub fn len(&self) -> usize {
+        self.cloud.as_ref().map_or(0, Cloud::len)
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    pub fn dim(&self) -> usize {
+        self.domain.dim
+    }
+
+    /// The cloud, or the error that says what to call first.
+    pub fn cloud(&self, call: &str) -> Result<&Cloud> {
+        self.cloud.as_ref().ok_or_else(|| Error::OutOfOrder { call: call.into(), missing: "set_particles".into() })
+    }
+
+    /// Takes a new box; particles already here are wrapped into it.
+    pub fn set_box(&mut self, domain: Domain) -> Result<()> {
+        if domain == self.domain {
+            return Ok(());
+        }
+        let old = std::mem::replace(&mut self.domain, domain);
+        let moved = if self.cloud.is_some() { self.sort_again(0.0) } else { Ok(()) };
+        if moved.is_err() {
+            self.domain = old;
+            return moved;
+        }
+        self.drop_geometry();
+        Ok(())
+    }
+
+    /// Takes positions. Other quantities stay with their particles; they are dropped where the number changes.
+    pub fn set_positions(&mut self, x: Strided) -> Result<()> {
+        if self.cloud.as_ref().is_some_and(|c| c.domain == self.domain && c.is_at(x, &self.pool)) {
+            return Ok(());
+        }
+        let reach = self.reach(x);
+        let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
+        self.place(cloud)?;
+        self.drop_geometry();
+        Ok(())
+    }
+
+    /// Sorts again for a search that reaches this far.
+    pub fn sort_again(&mut self, reach: f64) -> Result<()> {
+        let Some(cloud) = &self.cloud else { return Ok(()) };
+        let (n, dim) = (cloud.len(), cloud.dim());
+        let mut x = memory::filled("positions", n * dim, 0.0)?;
+        for (i, &host) in cloud.host.iter().enumerate() {
+            (0..dim).for_each(|a| x[host as usize * dim + a] = cloud.x[a][i]);
+        }
+        let x = Strided::new("x", &x, n, dim, dim)?;
+        let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
+        self.place(cloud)
+    }
+
+    /// Puts a newly sorted cloud in place and carries the inputs over to its order.
+    fn place(&mut self, cloud: Cloud) -> Result<()> {
+        let n = cloud.len();
+        if let Some(old) = self.cloud.as_ref().filter(|old| old.len() == n) {
+            let mut was = memory::filled("order", n, 0u32)?;
+            old.host.iter().enumerate().for_each(|(i, &host)| was[host as usize] = i as u32);
+            let mut moved = [const { None }; INPUTS];
+            for (input, moved) in self.inputs.iter().zip(&mut moved) {
+                if let Input::Each(v) = input {
+                    let values = cloud.host.iter().map(|&host| v[was[host as usize] as usize]);
+                    *moved = Some(Input::Each(memory::collected("particle data", values)?));
+                }
+            }
+            for (input, moved) in self.inputs.iter_mut().zip(moved) {
+                if let Some(moved) = moved {
+                    *input = moved;
+                }
+            }
+        } else {
+            for (slot, input) in self.inputs.iter_mut().enumerate().filter(|(_, i)| matches!(i, Input::Each(_))) {
+                *input = Input::default_of(slot);
+            }
+        }
+        self.cloud = Some(cloud);
+        (self.inverse_capacity, self.surface) = (None, None);
+        Ok(())
+    }
+
+    /// How far a search will reach, as far as that is known before density is.
+    fn reach(&self, x: Strided) -> f64 {
+        let radius = self.choices.kernel.radius();
+        if let Some(g) = &self.geometry {
+            return radius * g.h.iter().copied().fold(0.0, f64::max);
+        }
+        let mut volume = 1.0;
+        for axis in 0..self.dim() {
+            let range = (0..x.len()).map(|i| x.at(i, axis)).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+            volume *= if self.domain.periodic[axis] { self.domain.length(axis) } else { (range.1 - range.0).max(0.0) };
+        }
+        radius * self.choices.h_fac * (volume / x.len().max(1) as f64).powf(1.0 / self.dim() as f64)
+    }
+
+    /// Stores an input and drops what depended on its old value.
+    pub fn put(&mut self, slot: Slot, input: Input) {
+        if self.inputs[slot] == input {
+            return;
+        }
+        self.inputs[slot] = input;
+        match slot {
+            fields::M | fields::RHO | fields::H => self.drop_geometry(),
+            fields::KAPPA => self.drop_kappa(),
+            fields::C_V | fields::FIXED => (self.inverse_capacity, self.bounds) = (None, None),
+            fields::FLUX_IN | fields::H_CONV | fields::EMISSIVITY | fields::T_AMBIENT | fields::AREA => {
+                (self.surface, self.bounds) = (None, None);
+            }
+            _ => {}
+        }
+    }
+
+    /// Positions, masses, densities or smoothing lengths changed.
+    pub fn drop_geometry(&mut self) {
+        self.moves |= self.steps > 0;
+        (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
+        (self.surface, self.bounds) = (None, None);
+    }
+
+    /// The conductivity changed.
+    pub fn drop_kappa(&mut self) {
+        self.kappa_changes |= self.steps > 0;
+        self.bounds = None;
+        if self.weights.as_ref().is_some_and(|w| w.folded) {
+            self.weights = None;
+        }
+    }
+
+    /// kappa depends on T.
+    pub fn kappa_of_t(&self) -> bool {
+        self.law.is_some() || self.kappa_host.is_some()
+    }
+
+    /// Whether some particle exchanges heat with the outside.
+    pub fn exchanging(&self) -> usize {
+        let idle = |slot: Slot| matches!(&self.inputs[slot], Input::Number(0.0) | Input::Unset);
+        if [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY].into_iter().all(idle) {
+            return 0;
+        }
+        let flows = |i: usize| {
+            [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY].iter().any(|&s| self.inputs[s].at(i).unwrap_or(0.0) != 0.0)
+        };
+        (0..self.len()).filter(|&i| flows(i)).count()
+    }
+
+    pub fn heated(&self) -> bool {
+        let cold = match &self.inputs[fields::SOURCE] {
+            Input::Each(v) => v.iter().all(|&s| s == 0.0),
+            other => matches!(other, Input::Number(0.0) | Input::Unset),
+        };
+        self.source_host.is_some() || !cold
+    }
+
+    /// Facts about the scene; needs the geometry.
+    pub fn facts(&self) -> Facts {
+        let choices = &self.choices;
+        let (heated, exchanging) = (self.heated(), self.exchanging());
+        let strong_stability = choices.method.ssp > 0.0 && choices.options.keep_bounds;
+        Facts {
+            n: self.len(),
+            dim: self.dim(),
+            neighbours: self.geometry.as_ref().map_or(0.0, |g| g.neighbours),
+            same_h: self.geometry.as_ref().is_some_and(|g| g.same_h),
+            finds_h: self.inputs[fields::H] == Input::Unset && self.inputs[fields::RHO] == Input::Unset,
+            sums_rho: self.inputs[fields::RHO] == Input::Unset,
+            moves: self.moves,
+            uniform_kappa: !self.kappa_of_t() && matches!(self.inputs[fields::KAPPA], Input::Number(_)),
+            kappa_of_t: self.kappa_of_t(),
+            kappa_changes: self.kappa_changes,
+            exchanging,
+            heated,
+            positive: choices.operator.positive,
+            keeps_bounds: choices.operator.positive && strong_stability && !heated && exchanging == 0,
+            operator: choices.operator.name,
+            integrator: choices.method.name,
+            buffers: self.work.bytes() as f64 / 8.0 / self.len().max(1) as f64,
+        }
+    }
+
+    /// Bytes held for particles and weights.
+    pub fn bytes(&self) -> u64 {
+        let geometry = self.geometry.as_ref().map_or(0, |g| 8 * (g.h.len() + g.rho.len() + g.volume.len()) as u64);
+        let weights = self.weights.as_ref().map_or(0, |w| w.matrix.bytes() + memory::bytes(&w.moments));
+        let inputs: u64 = self.inputs.iter().map(Input::bytes).sum();
+        let capacity = self.inverse_capacity.as_ref().map_or(0, memory::bytes);
+        self.cloud.as_ref().map_or(0, Cloud::bytes) + geometry + weights + inputs + capacity + self.work.bytes()
+    }
+}
