@@ -39,7 +39,9 @@ impl Compressor {
             Compressor::Zlib => inflate(packed, block).is_ok(),
             Compressor::Lz4 => lz4_flex::block::decompress_into(packed, block).is_ok_and(|n| n == block.len()),
         };
-        whole.then_some(()).ok_or_else(|| broken("a compressed block does not unpack to the size that the file gives it"))
+        whole
+            .then_some(())
+            .ok_or_else(|| broken("a compressed block does not unpack to the size that the file gives it"))
     }
 }
 

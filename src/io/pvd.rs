@@ -94,7 +94,8 @@ fn parse(text: &[u8]) -> Result<Vec<Entry>> {
 }
 
 fn format(entries: &[Entry]) -> String {
-    let mut text = String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n");
+    let mut text =
+        String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n");
     for Entry { time, file } in entries {
         let file = super::xml_write::escaped(file);
         let _ = writeln!(text, "    <DataSet timestep=\"{time:?}\" part=\"0\" file=\"{file}\"/>");

@@ -204,7 +204,10 @@ impl<'a> Values<'a> {
     }
 
     /// The little-endian bytes of all values, handed on in blocks of [`BLOCK`] bytes (the last may be shorter).
-    pub(super) fn blocks<E>(&self, mut sink: impl FnMut(&[u8]) -> std::result::Result<(), E>) -> std::result::Result<(), E> {
+    pub(super) fn blocks<E>(
+        &self,
+        mut sink: impl FnMut(&[u8]) -> std::result::Result<(), E>,
+    ) -> std::result::Result<(), E> {
         // Of u64, so that the bytes are aligned for every element type.
         let mut scratch = vec![0u64; BLOCK / 8];
         let scratch: &mut [u8] = bytemuck::cast_slice_mut(&mut scratch);
@@ -273,7 +276,11 @@ fn count_is(name: &str, got: usize, n: usize, components: usize) -> Result<()> {
 fn name_is_writable(name: &str) -> Result<()> {
     let legal = |c: char| !c.is_control() && c != '\u{fffe}' && c != '\u{ffff}';
     if name.is_empty() || !name.chars().all(legal) {
-        return Err(Error::bad("name", format!("{name:?}"), "a name needs at least one letter and no control character"));
+        return Err(Error::bad(
+            "name",
+            format!("{name:?}"),
+            "a name needs at least one letter and no control character",
+        ));
     }
     Ok(())
 }

@@ -28,7 +28,9 @@ pub fn read(mut file: File, path: &Path, whole: bool) -> Result<Snapshot> {
         "PUnstructuredGrid" | "PPolyData" => Err(broken("a piece of a list is a list again")),
         "Collection" => Err(broken("it is a list of files; read one of those, or open it as a series")),
         // vtkio aborts the process on a forged compressed file, so it never sees one.
-        _ if compressor(root)?.is_some() => Err(broken(format!("a compressed {kind} is not supported; re-save it without compression"))),
+        _ if compressor(root)?.is_some() => {
+            Err(broken(format!("a compressed {kind} is not supported; re-save it without compression")))
+        }
         _ => legacy::read_xml(path),
     }
 }
@@ -95,7 +97,9 @@ fn read_until(file: &mut File, bytes: &mut Vec<u8>, from: usize, pattern: &[u8])
         }
         from = from.max((bytes.len() + 1).saturating_sub(pattern.len()));
         let step = 1 << 20;
-        bytes.try_reserve(step).map_err(|_| crate::memory::no_memory::<u8>("the text of the file", bytes.len() + step))?;
+        bytes
+            .try_reserve(step)
+            .map_err(|_| crate::memory::no_memory::<u8>("the text of the file", bytes.len() + step))?;
         if file.by_ref().take(step as u64).read_to_end(bytes).map_err(system)? == 0 {
             return Ok(None);
         }

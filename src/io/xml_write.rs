@@ -34,7 +34,10 @@ pub fn write(sink: impl Write + Seek, view: &View, options: Options) -> io::Resu
     let mut file = VtuFile { sink, options, appended: Vec::new() };
     file.open(view)?;
     file.section("Points", [("Points", 3, &view.points)])?;
-    file.section("Cells", [("connectivity", 1, &connectivity), ("offsets", 1, &offsets), ("types", 1, &types)])?;
+    if n > 0 {
+        // meshio stumbles over cells that are none.
+        file.section("Cells", [("connectivity", 1, &connectivity), ("offsets", 1, &offsets), ("types", 1, &types)])?;
+    }
     file.section("PointData", view.fields.iter().map(|f| (f.name.as_ref(), f.components, &f.values)))?;
     file.close()
 }
@@ -84,14 +87,14 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
     }
 
     fn metadata<T: std::fmt::Debug>(
-        &mut self, kind: &str, name: &str, values: impl IntoIterator<Item = T, IntoIter: ExactSizeIterator>,
+        &mut self,
+        kind: &str,
+        name: &str,
+        values: impl IntoIterator<Item = T, IntoIter: ExactSizeIterator>,
     ) -> io::Result<()> {
         let values = values.into_iter();
         let (name, count) = (escaped(name), values.len());
-        writeln!(
-            self.sink,
-            "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfTuples=\"{count}\" format=\"ascii\">"
-        )?;
+        writeln!(self.sink, "<DataArray type=\"{kind}\" Name=\"{name}\" NumberOfTuples=\"{count}\" format=\"ascii\">")?;
         for value in values {
             write!(self.sink, "{value:?} ")?;
         }
@@ -99,7 +102,9 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
     }
 
     fn section<'n>(
-        &mut self, name: &str, arrays: impl IntoIterator<Item = (&'n str, usize, &'a Values<'a>)>,
+        &mut self,
+        name: &str,
+        arrays: impl IntoIterator<Item = (&'n str, usize, &'a Values<'a>)>,
     ) -> io::Result<()> {
         writeln!(self.sink, "<{name}>")?;
         for (name, components, values) in arrays {
@@ -116,7 +121,8 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
         match self.options.encoding {
             Encoding::Base64 => {
                 writeln!(self.sink, " format=\"binary\">")?;
-                let mut text = Base64 { sink: &mut self.sink, waiting: Vec::with_capacity(2 * CHUNK), text: String::new() };
+                let mut text =
+                    Base64 { sink: &mut self.sink, waiting: Vec::with_capacity(2 * CHUNK), text: String::new() };
                 store(values, self.options.zlib, &mut text, |t| t.finish())?;
                 writeln!(self.sink, "\n</DataArray>")
             }
@@ -158,7 +164,12 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
 const OFFSET: usize = "offset=\"18446744073709551615\"".len();
 
 /// Size and values; `pause` is called where readers expect base64 to be padded.
-fn store<W: Write>(values: &Values, zlib: bool, sink: &mut W, pause: impl Fn(&mut W) -> io::Result<()>) -> io::Result<()> {
+fn store<W: Write>(
+    values: &Values,
+    zlib: bool,
+    sink: &mut W,
+    pause: impl Fn(&mut W) -> io::Result<()>,
+) -> io::Result<()> {
     if zlib {
         let (head, packed) = pack(values)?;
         head.iter().try_for_each(|word| sink.write_all(&word.to_le_bytes()))?;
