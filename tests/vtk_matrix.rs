@@ -1,0 +1,184 @@
+//! Files of real packages, read by us to the bit, and ours read by them: VTK (which is ParaView's and pyvista's reader and
+//! writer), pyvista and meshio. The other half is `vtk_matrix.py`.
+
+use diffusph::io::{self, Data, Encoding, Field, Options, Series, Snapshot};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn python(task: &str, folder: &Path) -> String {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    let interpreter = std::env::var_os("DIFFUSPH_PYTHON").map_or(root.join("target/venv/bin/python"), PathBuf::from);
+    let script = root.join("tests/vtk_matrix.py");
+    let run = Command::new(&interpreter).arg(script).arg(task).arg(folder).output();
+    let run = run.unwrap_or_else(|e| {
+        panic!(
+            "cannot run {} ({e}); this test needs Python with VTK, pyvista and meshio:\n    python3 -m venv target/venv \
+             && target/venv/bin/pip install meshio vtk pyvista numpy\nor set DIFFUSPH_PYTHON to an interpreter that has them",
+            interpreter.display()
+        )
+    });
+    assert!(run.status.success(), "{task}: {}", String::from_utf8_lossy(&run.stderr));
+    String::from_utf8(run.stdout).unwrap()
+}
+
+/// `path.arrays/number,type,components,name`: the exchange format of this test.
+fn expected(path: &Path) -> Snapshot {
+    let mut folder = path.to_path_buf().into_os_string();
+    folder.push(".arrays");
+    let mut fields: Vec<(usize, Field)> =
+        std::fs::read_dir(folder).unwrap().map(|file| array(&file.unwrap().path())).collect();
+    fields.sort_by_key(|(number, _)| *number);
+    let mut fields = fields.into_iter().map(|(_, field)| field);
+    let points = fields.next().unwrap().data.to_f64().unwrap();
+    Snapshot { points: points.as_chunks::<3>().0.to_vec(), fields: fields.collect(), ..Snapshot::default() }
+}
+
+fn array(path: &Path) -> (usize, Field) {
+    let label = path.file_name().unwrap().to_str().unwrap();
+    let parts: Vec<&str> = label.splitn(4, ',').collect();
+    let [number, kind, components, name] = parts[..] else { panic!("{label}") };
+    let bytes = std::fs::read(path).unwrap();
+    macro_rules! values {
+        ($type:ty) => {
+            bytes.as_chunks().0.iter().map(|b| <$type>::from_le_bytes(*b)).collect()
+        };
+    }
+    let data = match kind {
+        "Float64" => Data::F64(values!(f64)),
+        "Float32" => Data::F32(values!(f32)),
+        "Int64" => Data::I64(values!(i64)),
+        "Int32" => Data::I32(values!(i32)),
+        "UInt8" => Data::U8(bytes),
+        other => panic!("{other}"),
+    };
+    (number.parse().unwrap(), Field { name: name.into(), components: components.parse().unwrap(), data })
+}
+
+/// The little-endian bytes of an array.
+fn bytes(data: &Data) -> Vec<u8> {
+    match data {
+        Data::F64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        Data::F32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        Data::I64(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        Data::I32(v) => v.iter().flat_map(|x| x.to_le_bytes()).collect(),
+        Data::U8(v) => v.clone(),
+        other => panic!("{}", other.type_name()),
+    }
+}
+
+/// The first difference in bits, if there is one.
+fn difference(got: &Snapshot, wanted: &Snapshot) -> Option<String> {
+    let flat = |s: &Snapshot| bytes(&Data::F64(s.points.as_flattened().to_vec()));
+    if flat(got) != flat(wanted) {
+        return Some(format!("{} points differ from {}", got.points.len(), wanted.points.len()));
+    }
+    if got.fields.len() != wanted.fields.len() {
+        return Some(format!("{} arrays instead of {}", got.fields.len(), wanted.fields.len()));
+    }
+    wanted.fields.iter().find_map(|w| {
+        let same = |g: &Field| {
+            let kind = (g.components, g.data.type_name()) == (w.components, w.data.type_name());
+            kind && bytes(&g.data) == bytes(&w.data)
+        };
+        (!got.field(&w.name).is_some_and(same)).then(|| format!("array {}", w.name))
+    })
+}
+
+#[test]
+fn we_read_what_others_write() {
+    let dir = tempfile::tempdir().unwrap();
+    python("write", dir.path());
+    let entries = std::fs::read_dir(dir.path()).unwrap().map(|e| e.unwrap().path());
+    let files: Vec<PathBuf> = entries
+        .filter(|p| ["vtu", "vtp", "vtk", "pvtu"].iter().any(|e| p.extension().is_some_and(|x| x == *e)))
+        .collect();
+    let mut wrong = Vec::new();
+    for file in &files {
+        let name = file.file_name().unwrap().to_string_lossy().into_owned();
+        match io::read(file) {
+            Ok(got) => {
+                wrong.extend(difference(&got, &expected(file)).map(|d| format!("{name}: {d}")));
+                // VTK's files carry time and a text; meshio's, and lists of pieces, do not.
+                let ours = !name.starts_with("meshio") && !name.ends_with(".pvtu");
+                // VTK writes eleven digits into its legacy ascii.
+                let time = if name.contains("legacy") && name.contains("ascii") { 0.3 } else { 0.1 + 0.2 };
+                if ours && got.time != Some(time) {
+                    wrong.push(format!("{name}: time {:?}", got.time));
+                }
+                if ours && !name.ends_with(".vtk") && got.notes != [("note".into(), "two words".into())] {
+                    wrong.push(format!("{name}: notes {:?}", got.notes));
+                }
+            }
+            Err(e) => wrong.push(e.to_string()),
+        }
+    }
+    assert!(wrong.is_empty(), "{} of {} files:\n{}", wrong.len(), files.len(), wrong.join("\n"));
+    assert!(files.len() > 500, "only {} files were made", files.len());
+}
+
+fn cloud(n: usize) -> Snapshot {
+    let odd = [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, -0.0, 5e-324, f64::MAX];
+    let value = |i: usize| odd.get(i % 13).copied().unwrap_or((i as f64).sin());
+    let field = |name: &str, components, data| Field { name: name.into(), components, data };
+    Snapshot {
+        points: (0..n).map(|i| [i as f64, (i as f64).cos(), 1.0 / (i + 1) as f64]).collect(),
+        fields: vec![
+            field("T", 1, Data::F64((0..n).map(value).collect())),
+            field("v m s", 3, Data::F32((0..3 * n).map(|i| value(i) as f32).collect())),
+            field("stress", 9, Data::F64((0..9 * n).map(value).collect())),
+            field("id", 1, Data::I64((0..n).map(|i| (1 << 60) - i as i64).collect())),
+            field("count", 2, Data::I32((0..2 * n).map(|i| i as i32 - 1000).collect())),
+            field("kind", 1, Data::U8((0..n).map(|i| i as u8).collect())),
+        ],
+        time: Some(0.1 + 0.2),
+        notes: vec![("diffusph".into(), "kernel=M6 <κ>".into())],
+    }
+}
+
+fn lay_beside(path: &Path, snapshot: &Snapshot) {
+    let folder = PathBuf::from(format!("{}.arrays", path.display()));
+    std::fs::create_dir(&folder).unwrap();
+    let points =
+        Field { name: "points".into(), components: 3, data: Data::F64(snapshot.points.as_flattened().to_vec()) };
+    for (number, field) in [&points].into_iter().chain(&snapshot.fields).enumerate() {
+        let label = format!("{number},{},{},{}", field.data.type_name(), field.components, field.name);
+        std::fs::write(folder.join(label), bytes(&field.data)).unwrap();
+    }
+}
+
+#[test]
+fn others_read_what_we_write() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut count = 0;
+    // 32768 doubles are one block of our compressor, without a rest.
+    for n in [0, 1, 1000, 32768] {
+        let snapshot = cloud(n);
+        for (encoding, zlib) in [Encoding::Raw, Encoding::Base64].into_iter().flat_map(|e| [(e, false), (e, true)]) {
+            let path = dir.path().join(format!("{n}_{encoding:?}_{zlib}.vtu"));
+            io::write_vtu(&path, &snapshot.view(), Options { encoding, zlib }).unwrap();
+            lay_beside(&path, &snapshot);
+            count += 1;
+        }
+        let path = dir.path().join(format!("{n}.vtk"));
+        io::write_legacy(&path, &snapshot.view()).unwrap();
+        lay_beside(&path, &snapshot);
+        count += 1;
+    }
+    let mut series = Series::open_or_create(dir.path().join("series.pvd")).unwrap();
+    series.append(0.0, "1_Raw_false.vtu").unwrap();
+    series.append(0.1 + 0.2, dir.path().join("1000_Raw_true.vtu")).unwrap();
+    assert_eq!(python("read", dir.path()).trim(), count.to_string());
+}
+
+#[test]
+fn lzma_is_refused_with_a_remedy() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.vtu");
+    let file = "<VTKFile type=\"UnstructuredGrid\" compressor=\"vtkLZMADataCompressor\"><UnstructuredGrid/></VTKFile>";
+    std::fs::write(&path, file).unwrap();
+    let error = io::read(&path).unwrap_err().to_string();
+    assert!(
+        error.contains("a.vtu") && error.contains("LZMA") && error.contains("re-save the file with zlib"),
+        "{error}"
+    );
+}
