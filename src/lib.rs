@@ -35,3 +35,6 @@ pub mod plan;
 pub mod solver;
 
 pub mod io;
+
+pub use array::{Strided, StridedMut};
+pub use solver::Solver;

@@ -67,7 +67,7 @@ impl Heat<'_> {
             return Err(Error::Cancelled);
         }
         self.applications += 1;
-        self.evaluate_kappa(time, t)?;
+        self.kappa_of_t(time, t)?;
         self.diffuse(t, rate);
         if let Some(surface) = self.surface {
             surface.add(t, self.inverse_capacity, rate);
@@ -84,7 +84,7 @@ impl Heat<'_> {
 
     /// For each particle the radius and the centre's size of its Gershgorin circle, in 1/s.
     pub fn circles(&mut self, time: f64, t: &[f64]) -> Result<Vec<(f64, f64)>> {
-        self.evaluate_kappa(time, t)?;
+        self.kappa_of_t(time, t)?;
         let factor = if let Conductivity::Number(k) = self.conductivity { k } else { 1.0 };
         let mut circles = self.matrix.circles(self.pool, self.pair_kappa())?;
         for ((radius, centre), inverse) in circles.iter_mut().zip(self.inverse_capacity) {
@@ -108,7 +108,11 @@ impl Heat<'_> {
         }
     }
 
-    fn evaluate_kappa(&mut self, time: f64, t: &[f64]) -> Result<()> {
+    /// Evaluates kappa(T), where there is such a thing, for the pair sums to come; empty where there is not.
+    ///
+    /// # Errors
+    /// As [`Heat::rate`].
+    pub fn kappa_of_t(&mut self, time: f64, t: &[f64]) -> Result<&[f64]> {
         let kappa: &mut [f64] = match &mut self.conductivity {
             Conductivity::Law(law, kappa) => {
                 self.pool.chunks(kappa, BLOCK, |start, part| {
@@ -120,13 +124,14 @@ impl Heat<'_> {
                 called("kappa", host(time, self.host, t, kappa))?;
                 kappa
             }
-            _ => return Ok(()),
+            _ => return Ok(&[]),
         };
         let bad = crate::sum::first(self.pool, kappa.len(), |i| !(kappa[i] >= 0.0 && kappa[i].is_finite()));
-        bad.map_or(Ok(()), |i| {
+        if let Some(i) = bad {
             let value = format!("{} (at T = {})", kappa[i], t[i]);
-            Err(Error::bad_at("kappa", self.host[i] as usize, value, "it must be finite and not negative"))
-        })
+            return Err(Error::bad_at("kappa", self.host[i] as usize, value, "it must be finite and not negative"));
+        }
+        Ok(kappa)
     }
 
     fn release(&mut self, time: f64, t: &[f64], rate: &mut [f64]) -> Result<()> {

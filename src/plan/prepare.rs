@@ -118,14 +118,29 @@ impl State {
         }
     }
 
-    /// Calls `work` with the rows and the assembly of the operator.
+    /// Calls `work` with the rows of neighbours. Needs the geometry.
+    pub fn with_rows<T>(&self, work: impl FnOnce(&Rows) -> Result<T>) -> Result<T> {
+        let cloud = self.cloud("a search")?;
+        let h = self.geometry.as_ref().map_or(&[][..], |g| &g.h);
+        work(&Rows::new(cloud, h, self.choices.kernel.radius(), &self.pool)?)
+    }
+
+    /// Calls `work` with the assembly of the operator. Needs the geometry.
     pub fn with_assembly<T>(&self, same_h: bool, work: impl FnOnce(&Assembly) -> Result<T>) -> Result<T> {
-        let Some(g) = &self.geometry else {
-            return Err(Error::OutOfOrder { call: "weights".into(), missing: "set_particles".into() });
-        };
-        let rows = Rows::new(self.cloud("weights")?, &g.h, self.choices.kernel.radius(), &self.pool)?;
+        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
         let (operator, kernel) = (self.choices.operator, &self.choices.kernel);
-        work(&Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h })
+        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h }))
+    }
+
+    /// The conductivity of each particle at its temperature.
+    pub fn kappa_now(&mut self) -> Result<Vec<f64>> {
+        if !self.kappa_of_t() {
+            self.need(fields::KAPPA, "get kappa")?;
+            return self.each(fields::KAPPA);
+        }
+        let plan = self.prepare("get kappa")?;
+        let (t, time) = (self.each(fields::T)?, self.time);
+        self.with_motion(&plan, |motion| memory::copied("kappa", motion.heat.kappa_of_t(time, &t)?))
     }
 
     fn prepare_weights(&mut self, plan: &Plan) -> Result<()> {
@@ -192,11 +207,9 @@ impl State {
         if plan.leaves_out("no_wall") || self.surface.is_some() {
             return Ok(());
         }
-        let Some(g) = &self.geometry else { return Ok(()) };
-        let nu = self.dim() as f64;
         let value = |slot: Slot, i: usize| self.inputs[slot].at(i).unwrap_or(0.0);
         let exchange = |i: usize| Exchange {
-            area: self.inputs[fields::AREA].at(i).unwrap_or_else(|| g.volume[i].powf((nu - 1.0) / nu)),
+            area: self.area(i),
             flux_in: value(fields::FLUX_IN, i),
             h_conv: value(fields::H_CONV, i),
             emissivity: value(fields::EMISSIVITY, i),

@@ -269,6 +269,24 @@ impl State {
         }
     }
 
+    /// kappa(T) by a law or by the host's function; neither goes back to the field.
+    pub fn set_kappa_of_t(&mut self, law: Option<Law>, host: Option<Callback>) {
+        (self.law, self.kappa_host) = (law, host);
+        self.drop_kappa();
+    }
+
+    pub fn set_sigma_sb(&mut self, value: f64) {
+        self.sigma_sb = value;
+        (self.surface, self.bounds) = (None, None);
+    }
+
+    /// The area of a particle that faces outside: as given, or one face of a cube of its volume. Needs the geometry.
+    pub fn area(&self, i: usize) -> f64 {
+        let nu = self.dim() as f64;
+        let face = || self.geometry.as_ref().map_or(0.0, |g| g.volume[i].powf((nu - 1.0) / nu));
+        self.inputs[fields::AREA].at(i).unwrap_or_else(face)
+    }
+
     /// kappa depends on T.
     pub fn kappa_of_t(&self) -> bool {
         self.law.is_some() || self.kappa_host.is_some()

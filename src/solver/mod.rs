@@ -1,0 +1,241 @@
+//! The handle: create, set, step, get. What each call does is in the rooms below; here is what it is called, what it
+//! accepts and what it answers.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `mod` | create, set, step |
+//! | `query` | get: fields and numbers, computed when asked for |
+//! | `files` | particles from and to VTK files |
+//! | `catalogue` | what can be chosen, by name |
+
+pub mod catalogue;
+mod files;
+mod query;
+
+use crate::array::{Strided, StridedMut};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::model::conductivity::Law;
+use crate::model::fields::{self, Access, FIELDS, NUMBERS};
+use crate::model::heat::Callback;
+use crate::plan::state::{Input, Progress, State};
+use crate::plan::{Choices, Plan, Report};
+use crate::space::Domain;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+/// A diffusion solver on a set of particles.
+///
+/// ```
+/// # fn main() -> diffusph::error::Result<()> {
+/// use diffusph::{Solver, Strided};
+/// let n = 100;
+/// let x: Vec<f64> = (0..n).map(|i| (i as f64 + 0.5) / n as f64).collect();
+/// let t: Vec<f64> = x.iter().map(|x| (2.0 * std::f64::consts::PI * x).sin()).collect();
+///
+/// let mut solver = Solver::new("heat dim=1 kernel=M6 integrator=rkl2")?;
+/// solver.set_box(&[0.0], &[1.0], &[true])?;
+/// solver.set_particles(Strided::packed(&x))?;
+/// solver.set_number("m", 1.0 / n as f64)?;
+/// solver.set_number("kappa", 1.0)?;
+/// solver.set("T", Strided::packed(&t))?;
+/// let report = solver.step(0.01)?;
+/// let decay = report.t_max / t.iter().cloned().fold(0.0, f64::max);
+/// assert!((decay - (-0.04 * std::f64::consts::PI.powi(2)).exp()).abs() < 2e-3);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Solver {
+    state: State,
+}
+
+impl Solver {
+    /// A solver from words like `heat dim=3 kernel=M6 operator=kernel integrator=rkl2`; the catalogue `words` lists
+    /// them all.
+    ///
+    /// # Errors
+    /// `UnknownWord` with the nearest known word, `BadValue`.
+    pub fn new(words: &str) -> Result<Solver> {
+        Ok(Solver { state: State::new(Choices::parse(words)?)? })
+    }
+
+    pub fn dim(&self) -> usize {
+        self.state.dim()
+    }
+
+    /// Number of particles; 0 before `set_particles`.
+    pub fn len(&self) -> usize {
+        self.state.len()
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.state.is_empty()
+    }
+
+    /// The words it was created with.
+    pub fn words(&self) -> &str {
+        &self.state.choices.line
+    }
+
+    /// The box: bounds and whether it is periodic, per axis. Without it, space is open.
+    ///
+    /// # Errors
+    /// `WrongCount` unless each has `dim` values; `BadElement` for bounds that are not finite or a periodic axis
+    /// without length.
+    pub fn set_box(&mut self, lo: &[f64], hi: &[f64], periodic: &[bool]) -> Result<()> {
+        for (name, len) in [("lo", lo.len()), ("hi", hi.len()), ("periodic", periodic.len())] {
+            expect(name, len, self.dim(), "one value per axis")?;
+        }
+        self.state.set_box(Domain::new(lo, hi, periodic)?)
+    }
+
+    /// Positions, `dim` components each. The same number again moves the particles, which keep all else; another
+    /// number starts anew, and what was given per particle must be given again.
+    ///
+    /// # Errors
+    /// `WrongCount`, `BadElement` naming the first coordinate that is not finite, `NoMemory`.
+    pub fn set_particles(&mut self, x: Strided) -> Result<()> {
+        expect("x", x.components(), self.dim(), "dim components per particle")?;
+        self.state.set_positions(x)
+    }
+
+    /// A quantity for each particle; the catalogue `fields` lists them.
+    ///
+    /// # Errors
+    /// `UnknownWord`, `OutOfOrder` before `set_particles`, `WrongCount`, `BadElement` naming the first bad value.
+    pub fn set(&mut self, name: &str, values: Strided) -> Result<()> {
+        if name == "x" {
+            expect("x", values.len(), self.len(), "one position per particle")?;
+            return self.set_particles(values);
+        }
+        let energy = name == "u";
+        let slot = if energy { fields::T } else { fields::slot(name)? };
+        let cloud = self.state.cloud("set")?;
+        expect(name, values.len(), self.len(), "one value per particle")?;
+        expect(name, values.components(), 1, "one component")?;
+        if let Access::Input { domain, .. } = FIELDS[slot].access {
+            values.check(name, domain.rule(), |v| domain.holds(v))?;
+        }
+        let mut values = cloud.inward(name, values, 0)?;
+        if energy {
+            let c_v = self.state.each(fields::C_V)?;
+            values.iter_mut().zip(c_v).for_each(|(u, c_v)| *u /= c_v);
+        }
+        self.put(slot, Input::Each(values));
+        Ok(())
+    }
+
+    /// One value for all particles, or a number of the solver such as `time` or `sigma_SB`.
+    ///
+    /// # Errors
+    /// `UnknownWord`, `BadValue`.
+    pub fn set_number(&mut self, name: &str, value: f64) -> Result<()> {
+        let own = NUMBERS.iter().find(|n| n.name == name);
+        let domain = match own {
+            Some(number) => number.settable,
+            None => match FIELDS[fields::slot(name)?].access {
+                Access::Input { domain, .. } => Some(domain),
+                Access::Output => None,
+            },
+        };
+        match domain {
+            None => return Err(Error::bad("name", format!("'{name}'"), "it is a result, it cannot be set")),
+            Some(domain) if !domain.holds(value) => return Err(Error::bad(name, value, domain.rule())),
+            Some(_) => {}
+        }
+        match name {
+            "time" => self.state.time = value,
+            "sigma_SB" => self.state.set_sigma_sb(value),
+            _ => self.put(fields::slot(name)?, Input::Number(value)),
+        }
+        Ok(())
+    }
+
+    fn put(&mut self, slot: fields::Slot, input: Input) {
+        if slot == fields::KAPPA && self.state.kappa_of_t() {
+            self.state.set_kappa_of_t(None, None);
+        }
+        self.state.put(slot, input);
+    }
+
+    /// kappa(T) in words: `power kappa0=1 T0=300 n=2.5`, `table T=300,400 kappa=1,2`; the catalogue `laws`.
+    ///
+    /// # Errors
+    /// `UnknownWord` for a name other than `kappa` or an unknown law, `BadValue`.
+    pub fn set_law(&mut self, name: &str, words: &str) -> Result<()> {
+        if name != "kappa" {
+            return Err(Error::unknown("quantity with laws", name, ["kappa"]));
+        }
+        self.state.set_kappa_of_t(Some(Law::parse(words)?), None);
+        Ok(())
+    }
+
+    /// kappa(T) by a function; none takes it away.
+    pub fn set_kappa_callback(&mut self, callback: Option<Callback>) {
+        self.state.set_kappa_of_t(None, callback);
+    }
+
+    /// Heat released per volume by a function, in place of `source`; none takes it away.
+    pub fn set_source_callback(&mut self, callback: Option<Callback>) {
+        self.state.source_host = callback;
+    }
+
+    /// Called between sub-steps; an answer other than 0 cancels the step.
+    pub fn set_progress_callback(&mut self, callback: Option<Progress>) {
+        self.state.progress = callback;
+    }
+
+    /// Setting it from any thread makes the running step stop with `Cancelled`.
+    pub fn canceller(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.state.cancel)
+    }
+
+    /// Advances by exactly `dt`, in as many sub-steps as the method needs.
+    ///
+    /// # Errors
+    /// See [`State::step`]; whatever goes wrong, T and time are as they were.
+    pub fn step(&mut self, dt: f64) -> Result<Report> {
+        self.state.step(dt)
+    }
+
+    /// du/dt now, W/kg, for hosts that integrate themselves.
+    ///
+    /// # Errors
+    /// As [`Solver::get`].
+    pub fn rate(&mut self, out: StridedMut) -> Result<()> {
+        self.get("rate", out)
+    }
+
+    /// The largest stable explicit Euler step now, s; infinite where nothing diffuses.
+    pub fn limit(&mut self) -> Result<f64> {
+        self.state.limit()
+    }
+
+    /// What a step will do, and what it leaves out and why.
+    pub fn plan(&mut self) -> Result<Plan> {
+        self.state.plan()
+    }
+
+    /// Seconds spent in each pass so far, and how often the operator was applied.
+    pub fn spent(&self) -> (Vec<(&'static str, f64)>, u64) {
+        (self.state.timers.seconds().collect(), self.state.applications)
+    }
+
+    /// Forgets the worker threads, which do not exist in a forked child; for a handle that is thrown away there.
+    pub fn abandon(self) {
+        self.state.pool.abandon();
+    }
+}
+
+pub(crate) fn expect(name: &str, got: usize, expected: usize, remedy: &str) -> Result<()> {
+    if got == expected {
+        return Ok(());
+    }
+    let (got, expected) = (got as i64, expected as i64);
+    Err(Error::WrongCount { argument: name.into(), got, expected, remedy: remedy.into() })
+}
+
+/// Splits vectors into their components.
+fn columns(vectors: &[[f64; 3]], dim: usize) -> Result<Vec<Vec<f64>>> {
+    (0..dim).map(|a| memory::collected("components", vectors.iter().map(|v| v[a]))).collect()
+}

@@ -1,0 +1,159 @@
+//! What a host may ask for. A derived quantity is computed only when it is asked for.
+
+use super::{Solver, columns, expect};
+use crate::array::StridedMut;
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::model::fields::{self, FIELDS, Field, Slot};
+use crate::operator::{gradient, moments};
+use crate::plan::state::{Input, State, Weights};
+use crate::space::density;
+
+impl Solver {
+    /// A quantity of each particle, in the host's order; the catalogue `fields` lists them.
+    ///
+    /// # Errors
+    /// `UnknownWord`, `WrongCount`, `OutOfOrder`; nothing is written then.
+    pub fn get(&mut self, name: &str, mut out: StridedMut) -> Result<()> {
+        let field = fields::field(name)?;
+        let components = if field.vector { self.dim() } else { 1 };
+        self.state.cloud("get")?;
+        expect(name, out.len(), self.len(), "one value per particle")?;
+        expect(name, out.components(), components, "dim components for vectors, else 1")?;
+        let values = values(&mut self.state, field)?;
+        let cloud = self.state.cloud("get")?;
+        for (c, values) in values.iter().enumerate() {
+            cloud.host.iter().zip(values).for_each(|(&host, &v)| out.set(host as usize, c, v));
+        }
+        Ok(())
+    }
+
+    /// A quantity of each particle as a packed array.
+    ///
+    /// # Errors
+    /// As [`Solver::get`].
+    pub fn get_all(&mut self, name: &str) -> Result<Vec<f64>> {
+        let components = if fields::field(name)?.vector { self.dim() } else { 1 };
+        let n = self.len();
+        let mut out = memory::filled(name, n * components, 0.0)?;
+        self.get(name, StridedMut::new(name, &mut out, n, components, components)?)?;
+        Ok(out)
+    }
+
+    /// A number of the solver; the catalogue `numbers` lists them.
+    ///
+    /// # Errors
+    /// `UnknownWord`, `OutOfOrder`.
+    pub fn get_number(&mut self, name: &str) -> Result<f64> {
+        let number = fields::number(name)?;
+        let state = &mut self.state;
+        let temperatures = |state: &State| -> Result<Vec<f64>> {
+            state.cloud("get_number")?;
+            state.each(fields::T)
+        };
+        let moments = |state: &mut State, fold: fn(f64, f64) -> f64, start: f64| -> Result<f64> {
+            Ok(prepared(state)?.moments.iter().copied().fold(start, fold))
+        };
+        Ok(match number.name {
+            "time" => state.time,
+            "sigma_SB" => state.sigma_sb,
+            "n" => state.len() as f64,
+            "energy" => state.energy(&temperatures(state)?),
+            "T_min" => state.extrema(&temperatures(state)?).0,
+            "T_max" => state.extrema(&temperatures(state)?).1,
+            "limit" => state.limit()?,
+            "spectral_bound" => state.bounds()?.spectral,
+            "smallest_weight" => {
+                prepared(state)?;
+                state.weights.as_ref().map_or(0.0, |w| w.matrix.smallest(&state.pool))
+            }
+            "mean_neighbours" => {
+                let n = state.len().max(1) as f64;
+                prepared(state)?.matrix.pairs() as f64 / n
+            }
+            "K_d2_min" => moments(state, f64::min, f64::INFINITY)?,
+            "K_d2_max" => moments(state, f64::max, f64::NEG_INFINITY)?,
+            "bytes" => state.bytes() as f64,
+            _ => state.pool.threads() as f64,
+        })
+    }
+}
+
+/// The components of a field, each in internal order.
+fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
+    let n = state.len();
+    let scalar = match field.name {
+        "x" => {
+            let dim = state.dim();
+            return state.cloud("get")?.x[..dim].iter().map(|x| memory::copied("x", x)).collect();
+        }
+        "first_moment" => {
+            let same_h = geometry(state)?.same_h;
+            let found = state.with_assembly(same_h, |a| moments::first(a, &state.pool))?;
+            return columns(&found, state.dim());
+        }
+        "grad_T" => return gradient_of_t(state),
+        "flux" => {
+            let (mut flux, kappa) = (gradient_of_t(state)?, state.kappa_now()?);
+            flux.iter_mut().for_each(|g| g.iter_mut().zip(&kappa).for_each(|(g, k)| *g *= -k));
+            return Ok(flux);
+        }
+        "rho" => memory::copied("rho", &geometry(state)?.rho)?,
+        "h" => memory::copied("h", &geometry(state)?.h)?,
+        "area" => {
+            geometry(state)?;
+            memory::collected("area", (0..n).map(|i| state.area(i)))?
+        }
+        "u" => times_c_v(state, given(state, fields::T)?)?,
+        "dT_dt" => state.rate()?,
+        "rate" => {
+            let rate = state.rate()?;
+            times_c_v(state, rate)?
+        }
+        "kappa" => state.kappa_now()?,
+        "K_d2" => memory::copied("K_d2", &prepared(state)?.moments)?,
+        "neighbours" => {
+            let matrix = &prepared(state)?.matrix;
+            memory::collected("neighbours", (0..n).map(|i| matrix.neighbours(i) as f64))?
+        }
+        "omega" => {
+            let m = given(state, fields::M)?;
+            geometry(state)?;
+            state.with_rows(|rows| density::omega(&state.choices.kernel, rows, &m, &state.pool))?
+        }
+        name => given(state, fields::slot(name)?)?,
+    };
+    Ok(vec![scalar])
+}
+
+/// An input as an array, or the error that says that it was not set.
+fn given(state: &State, slot: Slot) -> Result<Vec<f64>> {
+    if state.inputs[slot] == Input::Unset && !state.is_empty() {
+        let name = FIELDS[slot].name;
+        return Err(Error::OutOfOrder { call: format!("get {name}"), missing: format!("set {name}") });
+    }
+    state.each(slot)
+}
+
+fn geometry(state: &mut State) -> Result<&crate::plan::state::Geometry> {
+    state.prepare_geometry("get")?;
+    state.geometry.as_ref().ok_or(Error::OutOfOrder { call: "get".into(), missing: "set_particles".into() })
+}
+
+fn prepared(state: &mut State) -> Result<&Weights> {
+    state.prepare("get")?;
+    state.weights.as_ref().ok_or(Error::OutOfOrder { call: "get".into(), missing: "set_particles".into() })
+}
+
+fn gradient_of_t(state: &mut State) -> Result<Vec<Vec<f64>>> {
+    let t = given(state, fields::T)?;
+    let volume = memory::copied("volumes", &geometry(state)?.volume)?;
+    let found = state.with_rows(|rows| gradient::of(&t, &state.choices.kernel, rows, &volume, &state.pool))?;
+    columns(&found, state.dim())
+}
+
+fn times_c_v(state: &State, mut values: Vec<f64>) -> Result<Vec<f64>> {
+    let c_v = state.each(fields::C_V)?;
+    values.iter_mut().zip(c_v).for_each(|(v, c_v)| *v *= c_v);
+    Ok(values)
+}
