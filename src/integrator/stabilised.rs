@@ -31,6 +31,18 @@ pub struct Stage {
     pub gamma_rate: f64,
 }
 
+impl Stage {
+    /// Turns Y_{j-2} into Y_j, in one pass. Differences from y leave a value that does not change as it is, to the bit.
+    fn update(&self, dt: f64, new: &mut [f64], arrays: [&[f64]; 4]) {
+        let [y, last, rate, first_rate] = arrays.map(|a| &a[..new.len()]);
+        let (mu_dt, gamma_dt) = (self.mu_rate * dt, self.gamma_rate * dt);
+        for (i, new) in new.iter_mut().enumerate() {
+            let moved = self.mu * (last[i] - y[i]) + self.nu * (*new - y[i]);
+            *new = y[i] + (moved + (mu_dt * rate[i] + gamma_dt * first_rate[i]));
+        }
+    }
+}
+
 #[derive(Debug)]
 pub struct Recursion {
     /// Coefficients of stage j of s, j >= 1.
@@ -79,8 +91,8 @@ impl Recursion {
         let first = (self.stage)(s, 1.0).mu_rate;
         before.copy_from_slice(y);
         pool.chunks(last, BLOCK, |start, part| {
-            for (i, new) in (start..).zip(part) {
-                *new = y[i] + dt * first * first_rate[i];
+            for (new, (y, rate)) in part.iter_mut().zip(y[start..].iter().zip(&first_rate[start..])) {
+                *new = y + dt * first * rate;
             }
         });
         // Where a stage stands in time follows from the same recursion, in units of dt.
@@ -88,13 +100,8 @@ impl Recursion {
         for j in 2..=schedule.stages {
             let k = (self.stage)(s, f64::from(j));
             system.rate(t + time_last * dt, last, rate)?;
-            let (mu_dt, gamma_dt) = (k.mu_rate * dt, k.gamma_rate * dt);
-            // Differences from y leave a value that does not change as it is, to the bit.
             pool.chunks(before, BLOCK, |start, part| {
-                for (i, new) in (start..).zip(part) {
-                    let moved = k.mu * (last[i] - y[i]) + k.nu * (*new - y[i]);
-                    *new = y[i] + (moved + (mu_dt * rate[i] + gamma_dt * first_rate[i]));
-                }
+                k.update(dt, part, [&y[start..], &last[start..], &rate[start..], &first_rate[start..]]);
             });
             let time = k.mu * time_last + k.nu * time_before + k.mu_rate + k.gamma_rate;
             (time_before, time_last) = (time_last, time);
