@@ -1,1 +1,266 @@
+//! Advancing dy/dt = rate(t, y) by explicit and stabilised Runge-Kutta methods: a table of methods, the schedule of
+//! sub-steps and stages that a step needs, and the sub-step itself. What y is, the integrator does not know.
 
+mod explicit;
+mod stabilised;
+
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::pool::Pool;
+use explicit::Tableau;
+use stabilised::Recursion;
+
+/// What an integrator advances: dy/dt = rate(t, y).
+pub trait System {
+    /// Writes the rate at (t, y) to `dy`, which has the length of `y` and holds nothing of use before.
+    fn rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<()>;
+}
+
+/// One row of [`METHODS`].
+#[derive(Debug)]
+pub struct Method {
+    pub name: &'static str,
+    pub about: &'static str,
+    pub order: u32,
+    /// The strong-stability coefficient: steps within `ssp / Bounds::diagonal` are convex combinations of Euler steps
+    /// that keep the maximum principle. Zero: the method promises no such thing at any step.
+    pub ssp: f64,
+    family: Family,
+}
+
+#[derive(Debug)]
+enum Family {
+    Explicit(&'static Tableau),
+    Stabilised(&'static Recursion),
+}
+
+/// Every integrator of this room.
+pub static METHODS: &[Method] = &[
+    Method {
+        name: "euler",
+        about: "forward Euler, one stage, order 1; keeps the maximum principle",
+        order: 1,
+        ssp: 1.0,
+        family: Family::Explicit(&explicit::EULER),
+    },
+    Method {
+        name: "ssprk2",
+        about: "Heun's method, two stages, order 2, strong stability preserving (Shu & Osher 1988)",
+        order: 2,
+        ssp: 1.0,
+        family: Family::Explicit(&explicit::SSPRK2),
+    },
+    Method {
+        name: "ssprk3",
+        about: "three stages, order 3, strong stability preserving (Shu & Osher 1988)",
+        order: 3,
+        ssp: 1.0,
+        family: Family::Explicit(&explicit::SSPRK3),
+    },
+    Method {
+        name: "rk4",
+        about: "the classical four stages, order 4 (Kutta 1901)",
+        order: 4,
+        ssp: 0.0,
+        family: Family::Explicit(&explicit::RK4),
+    },
+    Method {
+        name: "rkl1",
+        about: "Runge-Kutta-Legendre, order 1, s stages for a step of (s^2+s)/2 Euler steps (Meyer, Balsara & Aslam 2014)",
+        order: 1,
+        ssp: 0.0,
+        family: Family::Stabilised(&stabilised::RKL1),
+    },
+    Method {
+        name: "rkl2",
+        about: "Runge-Kutta-Legendre, order 2, s stages for a step of (s^2+s-2)/4 Euler steps (Meyer, Balsara & Aslam 2014)",
+        order: 2,
+        ssp: 0.0,
+        family: Family::Stabilised(&stabilised::RKL2),
+    },
+];
+
+/// The method of this name, in either case, or an error that lists the known ones.
+pub fn find(word: &str) -> Result<&'static Method> {
+    METHODS
+        .iter()
+        .find(|m| m.name.eq_ignore_ascii_case(word))
+        .ok_or_else(|| Error::unknown("integrator", word, METHODS.iter().map(|m| m.name)))
+}
+
+/// Bounds on a linear(ised) operator with real eigenvalues of one sign, in 1/time.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// At least the largest |eigenvalue|.
+    pub spectral: f64,
+    /// The largest row sum: 1/diagonal is the largest Euler step that keeps the maximum principle.
+    pub diagonal: f64,
+}
+
+#[derive(Debug, Clone)]
+pub struct Options {
+    /// Stages of a stabilised method, pinned so that orders can be measured; chosen from the step where `None`.
+    /// Explicit methods have their own number.
+    pub stages: Option<u32>,
+    /// Most stages of a stabilised method per sub-step; more sub-steps are taken instead.
+    pub max_stages: u32,
+    /// Keep sub-steps within `ssp / diagonal`; asks nothing of methods whose `ssp` is zero.
+    pub keep_bounds: bool,
+    /// Most applications of the operator in one step.
+    pub max_applications: u64,
+}
+
+impl Default for Options {
+    fn default() -> Options {
+        Options { stages: None, max_stages: stabilised::MAX_STAGES, keep_bounds: false, max_applications: 1_000_000 }
+    }
+}
+
+/// How a step is taken: `substeps` equal sub-steps of `dt`, each with `stages` applications of the operator.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Schedule {
+    pub substeps: u64,
+    pub stages: u32,
+    /// Length of each sub-step: `total / substeps`, rounded once.
+    pub dt: f64,
+    /// The whole step, as asked for.
+    pub total: f64,
+}
+
+impl Schedule {
+    pub fn applications(&self) -> u64 {
+        self.substeps.saturating_mul(u64::from(self.stages))
+    }
+
+    /// Time from the beginning of the step to that of sub-step `k`: 0 for the first, `total` to the bit for
+    /// `k = substeps`.
+    pub fn start(&self, k: u64) -> f64 {
+        if k >= self.substeps { self.total } else { self.dt * k as f64 }
+    }
+}
+
+impl Method {
+    /// The fewest equal sub-steps, each with the fewest stages, that are stable under `bounds`. A step of zero has no
+    /// sub-steps; one without stiffness has one.
+    ///
+    /// Errors: `StepTooLarge` beyond `max_applications`; `BadValue` for a dt or a bound that is negative or not
+    /// finite, and for a number of stages with which the method does not exist.
+    pub fn schedule(&self, dt: f64, bounds: Bounds, options: &Options) -> Result<Schedule> {
+        for (what, value) in [("dt", dt), ("spectral", bounds.spectral), ("diagonal", bounds.diagonal)] {
+            if !(value >= 0.0 && value.is_finite()) {
+                return Err(Error::bad(what, value, "it must be finite and not negative"));
+            }
+        }
+        let most = self.most_stages(options)?;
+        if dt == 0.0 {
+            return Ok(Schedule { substeps: 0, stages: most, dt: 0.0, total: 0.0 });
+        }
+        let mut needed = dt * (bounds.spectral / self.interval(most));
+        if options.keep_bounds && self.ssp > 0.0 {
+            needed = needed.max(dt * (bounds.diagonal / self.ssp));
+        }
+        // As a float, because it may exceed every integer; infinity saturates.
+        let substeps = needed.ceil().max(1.0);
+        let part = dt / substeps;
+        let stages = self.fewest_stages(part * bounds.spectral, most, options);
+        let applications = substeps * f64::from(stages);
+        if applications > options.max_applications as f64 {
+            let needed = applications as u64;
+            return Err(Error::StepTooLarge { dt, needed, allowed: options.max_applications });
+        }
+        Ok(Schedule { substeps: substeps as u64, stages, dt: part, total: dt })
+    }
+
+    /// The largest stable sub-step with the fewest stages the method takes: the length of its real stability interval
+    /// over the spectral bound. Infinite where nothing is stiff.
+    pub fn limit(&self, bounds: Bounds) -> f64 {
+        let fewest = match self.family {
+            Family::Explicit(tableau) => tableau.stages(),
+            Family::Stabilised(_) => stabilised::LEAST_STAGES,
+        };
+        self.interval(fewest) / bounds.spectral
+    }
+
+    /// z such that the method is stable for real eigenvalues in [-z / dt, 0].
+    pub fn interval(&self, stages: u32) -> f64 {
+        match self.family {
+            Family::Explicit(tableau) => tableau.interval,
+            Family::Stabilised(recursion) => (recursion.interval)(f64::from(stages)),
+        }
+    }
+
+    /// One sub-step of `schedule.dt` from (t, y), in place. An error of the system is passed on and leaves y as it was.
+    pub fn advance(
+        &self,
+        schedule: &Schedule,
+        system: &mut dyn System,
+        pool: &Pool,
+        t: f64,
+        y: &mut [f64],
+        work: &mut Work,
+    ) -> Result<()> {
+        match self.family {
+            Family::Explicit(tableau) => tableau.advance(schedule.dt, system, pool, t, y, work),
+            Family::Stabilised(recursion) => recursion.advance(schedule, system, pool, t, y, work),
+        }
+    }
+
+    fn most_stages(&self, options: &Options) -> Result<u32> {
+        let recursion = match self.family {
+            Family::Explicit(tableau) => return Ok(tableau.stages()),
+            Family::Stabilised(recursion) => recursion,
+        };
+        match options.stages {
+            Some(s) if s < recursion.least => {
+                Err(Error::bad("stages", s, &format!("{} needs at least {}", self.name, recursion.least)))
+            }
+            Some(s) => Ok(s),
+            None if options.max_stages < stabilised::LEAST_STAGES => {
+                let rule = format!("{} takes at least {} stages", self.name, stabilised::LEAST_STAGES);
+                Err(Error::bad("max_stages", options.max_stages, &rule))
+            }
+            None => Ok((options.max_stages - 1) | 1),
+        }
+    }
+
+    fn fewest_stages(&self, z: f64, most: u32, options: &Options) -> u32 {
+        match self.family {
+            Family::Stabilised(_) if options.stages.is_none() => {
+                // Halving: the interval grows with the number of stages.
+                let odd = |i: u32| stabilised::LEAST_STAGES + 2 * i;
+                let (mut low, mut high) = (0, (most - stabilised::LEAST_STAGES) / 2);
+                while low < high {
+                    let middle = low + (high - low) / 2;
+                    if self.interval(odd(middle)) >= z { high = middle } else { low = middle + 1 }
+                }
+                odd(low)
+            }
+            _ => most,
+        }
+    }
+}
+
+/// The arrays a sub-step works on: reserved by the first sub-step, reused by all others of the same length.
+#[derive(Debug, Default)]
+pub struct Work {
+    arrays: [Vec<f64>; 5],
+}
+
+impl Work {
+    pub fn bytes(&self) -> u64 {
+        self.arrays.iter().map(memory::bytes).sum()
+    }
+
+    /// `K` arrays of length `n`, with anything in them.
+    fn arrays<const K: usize>(&mut self, n: usize) -> Result<&mut [Vec<f64>; K]> {
+        let arrays = self.arrays.first_chunk_mut::<K>();
+        let arrays = arrays.ok_or_else(|| Error::Panic { reason: "an integrator asks for too many arrays".into() })?;
+        for array in arrays.iter_mut().filter(|a| a.len() != n) {
+            *array = memory::filled("stages of the integrator", n, 0.0)?;
+        }
+        Ok(arrays)
+    }
+}
+
+#[cfg(test)]
+mod tests;

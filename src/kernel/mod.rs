@@ -2,6 +2,7 @@
 //! derivatives. [`table`] holds the shapes, nothing else; all else is derived.
 
 mod form;
+mod gaussian;
 mod table;
 
 use crate::error::{Error, Result};
@@ -10,7 +11,8 @@ use std::f64::consts::PI;
 use table::{KERNELS, Row, Shape};
 
 /// A kernel in a dimension. Functions of q = r/h on slices include sigma, and no power of h: divide by h^dim for W,
-/// by h^(dim+2) for W'/r and W''. They take any q >= 0 and are zero beyond the support.
+/// by h^(dim+2) for W'/r and W''. They take any q >= 0, infinity too, and are zero beyond the support (and for a
+/// NaN: check positions before).
 #[derive(Debug, Clone)]
 pub struct Kernel {
     row: &'static Row,

@@ -167,7 +167,8 @@ fn norms_are_those_of_the_literature() {
 #[test]
 fn shapes_are_those_of_the_literature() {
     let cut = |x: f64, k: i32| x.max(0.0).powi(k);
-    let known: [(&str, usize, &dyn Fn(f64) -> f64); 10] = [
+    type Shape<'a> = &'a dyn Fn(f64) -> f64;
+    let known: [(&str, usize, Shape); 10] = [
         ("m4", 2, &|q| if q < 1.0 { 1.0 - 1.5 * q * q + 0.75 * q.powi(3) } else { 0.25 * cut(2.0 - q, 3) }),
         ("M6/2", 3, &|q| cut(3.0 - 1.5 * q, 5) - 6.0 * cut(2.0 - 1.5 * q, 5) + 15.0 * cut(1.0 - 1.5 * q, 5)),
         ("C2", 1, &|q| cut(1.0 - 0.5 * q, 3) * (1.5 * q + 1.0)),
