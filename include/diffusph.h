@@ -181,7 +181,7 @@
 /**
  * Grows when a host that was compiled with an older header would no longer work; see diffusph_abi_version.
  */
-#define DIFFUSPH_ABI_VERSION 1
+#define DIFFUSPH_ABI 1
 
 /**
  * A solver. Use it from any thread, one call at a time.
@@ -572,7 +572,7 @@ int32_t diffusph_about(const char *list, int64_t i, char *buf, int64_t len);
  *
  * Errors: BAD_VALUE when there is no such status.
  */
-int32_t diffusph_error_name(int32_t status, char *buf, int64_t len);
+int32_t diffusph_error_name(int32_t code, char *buf, int64_t len);
 
 /**
  * The version of the library, like "0.1.0".
@@ -585,7 +585,7 @@ int32_t diffusph_version(char *buf, int64_t len);
 int32_t diffusph_version_number(void);
 
 /**
- * The version of the binary interface; not a status. A host works with any library that answers DIFFUSPH_ABI_VERSION.
+ * The version of the binary interface; not a status. A host works with any library that answers DIFFUSPH_ABI.
  */
 int32_t diffusph_abi_version(void);
 

@@ -1,6 +1,6 @@
 //! What can be chosen, by name, and which version this is.
 
-use super::codes::{DIFFUSPH_ABI_VERSION, DIFFUSPH_VERSION_NUMBER};
+use super::codes::{DIFFUSPH_ABI, DIFFUSPH_VERSION_NUMBER};
 use super::guard::alone;
 use super::pointers::{copy_out, place, text};
 use crate::error::{Error, Result, name_of};
@@ -63,9 +63,9 @@ fn item(list: &str, i: i64) -> Result<Item> {
 /// # Safety
 /// The header's conventions.
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn diffusph_error_name(status: i32, buf: *mut c_char, len: i64) -> i32 {
+pub unsafe extern "C" fn diffusph_error_name(code: i32, buf: *mut c_char, len: i64) -> i32 {
     alone(|| {
-        let name = name_of(status).ok_or_else(|| Error::bad("status", status, "there is no such status"))?;
+        let name = name_of(code).ok_or_else(|| Error::bad("code", code, "there is no such status"))?;
         unsafe { copy_out("buf", buf, len, name) }
     })
 }
@@ -85,8 +85,8 @@ pub extern "C" fn diffusph_version_number() -> i32 {
     DIFFUSPH_VERSION_NUMBER
 }
 
-/// The version of the binary interface; not a status. A host works with any library that answers DIFFUSPH_ABI_VERSION.
+/// The version of the binary interface; not a status. A host works with any library that answers DIFFUSPH_ABI.
 #[unsafe(no_mangle)]
 pub extern "C" fn diffusph_abi_version() -> i32 {
-    DIFFUSPH_ABI_VERSION
+    DIFFUSPH_ABI
 }

@@ -59,7 +59,7 @@ pub const DIFFUSPH_VERSION_PATCH: i32 = 0;
 pub const DIFFUSPH_VERSION_NUMBER: i32 =
     DIFFUSPH_VERSION_MAJOR * 10000 + DIFFUSPH_VERSION_MINOR * 100 + DIFFUSPH_VERSION_PATCH;
 /// Grows when a host that was compiled with an older header would no longer work; see diffusph_abi_version.
-pub const DIFFUSPH_ABI_VERSION: i32 = 1;
+pub const DIFFUSPH_ABI: i32 = 1;
 
 #[cfg(test)]
 mod tests {

@@ -196,7 +196,8 @@ mod tests {
         assert_eq!(call(&|_| ()), 0);
         assert_eq!(call(&|_| panic!("number {}", 7)), -13);
         assert_eq!(call(&|_| ()), -11);
-        let text = &handle.enter().unwrap().inside().message;
+        let mut entered = handle.enter().unwrap();
+        let text = &entered.inside().message;
         assert!(text.contains("number 7") && text.contains("destroy"), "{text}");
     }
 

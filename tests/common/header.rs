@@ -85,7 +85,7 @@ fn words(text: &str) -> String {
 }
 
 /// Without comments and preprocessor lines.
-fn without_comments(text: &str) -> String {
+pub fn without_comments(text: &str) -> String {
     let mut kept = String::new();
     let mut rest = text;
     while let Some((before, after)) = rest.split_once("/*") {
