@@ -92,17 +92,25 @@ fn the_module_has_the_header_s_functions_and_types() {
         ("diffusph_limit", "real(c_double), intent(inout) :: dt", "integer(c_int32_t), intent(inout) :: dt"),
         ("diffusph_get", "integer(c_int64_t), value :: n, stride", "integer(c_int32_t), value :: n, stride"),
         ("diffusph_report", "integer(c_int64_t) :: stages", "integer(c_int32_t) :: stages"),
-        ("diffusph_field_callback", "integer(c_int64_t), value :: n\n            integer(c_int32_t), intent(in) :: p",
-            "integer(c_int32_t), value :: n\n            integer(c_int32_t), intent(in) :: p"),
+        (
+            "diffusph_field_callback",
+            "integer(c_int64_t), value :: n\n            integer(c_int32_t), intent(in) :: p",
+            "integer(c_int32_t), value :: n\n            integer(c_int32_t), intent(in) :: p",
+        ),
         ("diffusph_cancel", "diffusph_cancel(", "diffusph_cancels("),
     ] {
         let text = module();
         // `import` must keep the module valid, so that the difference is the only thing that is wrong.
         let at = text.find(&format!("function {name}(")).or(text.find(&format!(":: {name}"))).unwrap();
         let drifted = text[..at].to_string()
-            + &text[at..].replacen(from, to, 1).replacen("import :: c_double, c_ptr", "import :: c_double, c_int32_t, c_ptr", 1);
+            + &text[at..].replacen(from, to, 1).replacen(
+                "import :: c_double, c_ptr",
+                "import :: c_double, c_int32_t, c_ptr",
+                1,
+            );
         assert_ne!(text, drifted, "{name}");
-        let found = differences(&c, &in_fortran(&drifted.replace("import :: c_int32_t, c_ptr\n", "import\n"), dir.path()));
+        let found =
+            differences(&c, &in_fortran(&drifted.replace("import :: c_int32_t, c_ptr\n", "import\n"), dir.path()));
         assert!(!found.is_empty() && found.iter().all(|d| d.starts_with(name)), "{name}: {found:?}");
     }
 }
@@ -165,5 +173,7 @@ fn the_report_is_the_same_in_memory() {
     let c = succeed(&mut Command::new(at("c")));
     assert_eq!(c, succeed(Command::new(at("f")).env("LD_LIBRARY_PATH", &library)));
     let numbers: Vec<i64> = c.lines().map(|l| l.parse().unwrap()).collect();
-    assert!(numbers.len() == names.len() + 2 && numbers[0] == numbers[1] && numbers.is_sorted_by_key(|n| n % numbers[0]));
+    assert!(
+        numbers.len() == names.len() + 2 && numbers[0] == numbers[1] && numbers.is_sorted_by_key(|n| n % numbers[0])
+    );
 }

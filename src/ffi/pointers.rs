@@ -114,10 +114,10 @@ pub fn count(n: i64) -> Result<usize> {
 fn layout(n: i64, stride: i64, components: usize) -> Result<(usize, usize, usize)> {
     let particles = count(n)?;
     let short = || format!("it counts the doubles from one particle to the next, at least {components} here");
-    let stride = usize::try_from(stride).ok().filter(|s| *s >= components);
-    let stride = stride.ok_or_else(|| Error::bad("stride", "too small", &short()))?;
-    let doubles = span(particles, stride, components).filter(|d| *d <= isize::MAX as usize / size_of::<f64>());
-    Ok((particles, stride, doubles.ok_or_else(|| Error::bad("n", n, "n * stride does not fit the address space"))?))
+    let step = usize::try_from(stride).ok().filter(|s| *s >= components);
+    let step = step.ok_or_else(|| Error::bad("stride", stride, &short()))?;
+    let doubles = span(particles, step, components).filter(|d| *d <= isize::MAX as usize / size_of::<f64>());
+    Ok((particles, step, doubles.ok_or_else(|| Error::bad("n", n, "n * stride does not fit the address space"))?))
 }
 
 /// Copies a text into the host's buffer, cut where it does not fit, always with a NUL at the end.
