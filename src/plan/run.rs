@@ -58,6 +58,7 @@ impl State {
 
     /// dT/dt now.
     pub fn rate(&mut self) -> Result<Vec<f64>> {
+        self.cancel.store(false, Ordering::Relaxed);
         let plan = self.prepare("rate")?;
         let (t, time) = (self.each(fields::T)?, self.time);
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
@@ -67,6 +68,7 @@ impl State {
 
     /// Bounds on the operator now, refined by power iteration.
     pub fn bounds(&mut self) -> Result<Bounds> {
+        self.cancel.store(false, Ordering::Relaxed);
         let plan = self.prepare("limit")?;
         let (t, time) = (self.each(fields::T)?, self.time);
         self.with_motion(&plan, |motion| {

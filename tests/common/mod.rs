@@ -2,6 +2,7 @@
 #![allow(dead_code)] // each test uses a part
 
 pub mod header;
+pub mod host;
 
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
