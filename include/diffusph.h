@@ -431,8 +431,8 @@ int32_t diffusph_step(struct diffusph_solver *s,
                       struct diffusph_report *report);
 
 /**
- * Makes the step that is running now return CANCELLED, with nothing changed. From any thread, also from a callback and
- * from a signal handler; the solver must not be destroyed meanwhile. Does nothing if no step is running.
+ * Makes the step (or rate, or limit) that is running now return CANCELLED, with nothing changed. From any thread, also
+ * from a callback and from a signal handler; the solver must not be destroyed meanwhile. Does nothing if none is running.
  *
  * Errors: NULL_POINTER.
  */

@@ -31,7 +31,8 @@ fn for_c_readers(text: &str) -> String {
         if line == " * # Safety" && lines.last() == Some(&" *") {
             lines.pop();
         }
-        if !skipping && !(line.is_empty() && lines.last().is_some_and(|l| l.is_empty())) {
+        let doubled = line.is_empty() && lines.last() == Some(&"");
+        if !(skipping || doubled) {
             lines.push(line);
         }
     }

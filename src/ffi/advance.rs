@@ -48,8 +48,8 @@ fn log_step(inside: &mut Inside, r: &Report) -> Result<()> {
     Ok(())
 }
 
-/// Makes the step that is running now return CANCELLED, with nothing changed. From any thread, also from a callback and
-/// from a signal handler; the solver must not be destroyed meanwhile. Does nothing if no step is running.
+/// Makes the step (or rate, or limit) that is running now return CANCELLED, with nothing changed. From any thread, also
+/// from a callback and from a signal handler; the solver must not be destroyed meanwhile. Does nothing if none is running.
 ///
 /// Errors: NULL_POINTER.
 ///

@@ -1,7 +1,6 @@
 //! Functions that a host lends. They run on the thread of the call, never on a worker.
 
 use super::guard::{Handle, with};
-use crate::error::Result;
 use crate::model::heat;
 use std::ffi::{CString, c_char, c_void};
 
@@ -48,7 +47,8 @@ pub struct Log {
 
 impl Log {
     pub fn tell(&self, level: i32, text: &str) {
-        if let Ok(text) = CString::new(text) {
+        // A damaged file's name for something may contain any character.
+        if let Ok(text) = CString::new(text.replace('\0', " ")) {
             // SAFETY: the host's word.
             unsafe { (self.function)(self.user.get(), level, text.as_ptr()) };
         }
@@ -73,7 +73,12 @@ pub unsafe extern "C" fn diffusph_set_kappa_callback(
     callback: FieldCallback,
     user: *mut c_void,
 ) -> i32 {
-    unsafe { with(s, |inside| done(inside.solver.set_kappa_callback(field(callback, user)))) }
+    unsafe {
+        with(s, |inside| {
+            inside.solver.set_kappa_callback(field(callback, user));
+            Ok(())
+        })
+    }
 }
 
 /// Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away. It is called
@@ -87,7 +92,12 @@ pub unsafe extern "C" fn diffusph_set_source_callback(
     callback: FieldCallback,
     user: *mut c_void,
 ) -> i32 {
-    unsafe { with(s, |inside| done(inside.solver.set_source_callback(field(callback, user)))) }
+    unsafe {
+        with(s, |inside| {
+            inside.solver.set_source_callback(field(callback, user));
+            Ok(())
+        })
+    }
 }
 
 /// A function told how far a step is, which can cancel it; NULL takes it away.
@@ -126,8 +136,4 @@ pub unsafe extern "C" fn diffusph_set_log_callback(s: *mut Handle, callback: Log
             Ok(())
         })
     }
-}
-
-fn done((): ()) -> Result<()> {
-    Ok(())
 }
