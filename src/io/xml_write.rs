@@ -26,24 +26,27 @@ pub enum Encoding {
 pub fn write(sink: impl Write + Seek, view: &View, options: Options) -> io::Result<()> {
     // An empty array has no block to compress, and meshio cannot join no blocks.
     let options = Options { zlib: options.zlib && view.n > 0, ..options };
-    let n = view.n;
-    let connectivity = Values::computed(n, |first, block: &mut [i64]| count_from(first, block));
-    let offsets = Values::computed(n, |first, block: &mut [i64]| count_from(first + 1, block));
-    let types = Values::computed(n, |_, block: &mut [u8]| block.fill(VERTEX));
+    let (cells, kind) = cells_of(view.n);
+    let connectivity = Values::computed(view.n, |first, block: &mut [i64]| count_from(first, block));
+    let offsets = Values::computed(cells, |first, block: &mut [i64]| match view.n {
+        0 => block.fill(0),
+        _ => count_from(first + 1, block),
+    });
+    let types = Values::computed(cells, |_, block: &mut [u8]| block.fill(kind));
 
     let mut file = VtuFile { sink, options, appended: Vec::new() };
     file.open(view)?;
     file.section("Points", [("Points", 3, &view.points)])?;
-    if n > 0 {
-        // meshio stumbles over cells that are none.
-        file.section("Cells", [("connectivity", 1, &connectivity), ("offsets", 1, &offsets), ("types", 1, &types)])?;
-    }
+    file.section("Cells", [("connectivity", 1, &connectivity), ("offsets", 1, &offsets), ("types", 1, &types)])?;
     file.section("PointData", view.fields.iter().map(|f| (f.name.as_ref(), f.components, &f.values)))?;
     file.close()
 }
 
-/// VTK's number of the cell that is one point.
-const VERTEX: u8 = 1;
+/// Number and type of the cells of `n` points: VERTEX each. meshio cannot read a file without cells, so no points make one
+/// POLY_VERTEX of no points, which meshio passes over.
+fn cells_of(n: usize) -> (usize, u8) {
+    if n == 0 { (1, 2) } else { (n, 1) }
+}
 
 fn count_from(first: usize, block: &mut [i64]) {
     block.iter_mut().enumerate().for_each(|(i, value)| *value = (first + i) as i64);
@@ -67,7 +70,7 @@ struct VtuFile<'a, W> {
 impl<'a, W: Write + Seek> VtuFile<'a, W> {
     fn open(&mut self, view: &View) -> io::Result<()> {
         let compressor = if self.options.zlib { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
-        let n = view.n;
+        let (n, cells) = (view.n, cells_of(view.n).0);
         writeln!(self.sink, "<?xml version=\"1.0\"?>")?;
         writeln!(
             self.sink,
@@ -83,7 +86,7 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
             self.metadata("Int8", name, text.bytes().map(|b| b as i8))?;
         }
         writeln!(self.sink, "</FieldData>")?;
-        writeln!(self.sink, "<Piece NumberOfPoints=\"{n}\" NumberOfCells=\"{n}\">")
+        writeln!(self.sink, "<Piece NumberOfPoints=\"{n}\" NumberOfCells=\"{cells}\">")
     }
 
     fn metadata<T: std::fmt::Debug>(
