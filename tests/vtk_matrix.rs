@@ -171,6 +171,21 @@ fn others_read_what_we_write() {
 }
 
 #[test]
+fn one_wrong_bit_is_seen_on_both_sides() {
+    let right = cloud(10);
+    let mut wrong = cloud(10);
+    wrong.points[9][2] = wrong.points[9][2].next_up();
+    assert!(difference(&right, &right).is_none() && difference(&wrong, &right).is_some());
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("a.vtu");
+    io::write_vtu(&path, &right.view(), Options::default()).unwrap();
+    lay_beside(&path, &wrong);
+    let python = std::panic::catch_unwind(|| python("read", dir.path()));
+    let reason = *python.unwrap_err().downcast::<String>().unwrap();
+    assert!(reason.contains("other bits"), "{reason}");
+}
+
+#[test]
 fn lzma_is_refused_with_a_remedy() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.vtu");

@@ -96,7 +96,7 @@ fn read_until(file: &mut File, bytes: &mut Vec<u8>, from: usize, pattern: &[u8])
             return Ok(Some(from + place));
         }
         from = from.max((bytes.len() + 1).saturating_sub(pattern.len()));
-        let step = 1 << 20;
+        let step = 1 << 16;
         bytes
             .try_reserve(step)
             .map_err(|_| crate::memory::no_memory::<u8>("the text of the file", bytes.len() + step))?;
