@@ -3,7 +3,9 @@
 //! vtkio can panic on a damaged file, so each call is guarded; it passes over what it cannot parse, so whatever it leaves
 //! unread is an error here; and it writes into memory, since it does not notice a full disk.
 
-use super::snapshot::{Data, Field, Snapshot, Values, View};
+use super::data::Data;
+use super::snapshot::{Field, Snapshot};
+use super::view::{Values, View};
 use super::{broken, system};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -202,11 +204,7 @@ fn grid(view: &View) -> Result<DataSet> {
 }
 
 fn buffer(values: &Values) -> Result<IOBuffer> {
-    let mut bytes = memory::reserved("an array of a legacy file", values.count * values.width)?;
-    values.blocks(|block| -> Result<()> {
-        bytes.extend_from_slice(block);
-        Ok(())
-    })?;
+    let bytes = values.bytes()?;
     let kind = match values.type_name {
         "Float64" => ScalarType::F64,
         "Float32" => ScalarType::F32,

@@ -1,7 +1,7 @@
 //! Writes a cloud as VTK's UnstructuredGrid, one VERTEX cell per particle: the form that VTK, ParaView, pyvista and
 //! meshio all read to the bit. Little-endian, sizes in UInt64 (UInt32 ends at 4 GiB an array).
 
-use super::snapshot::{BLOCK, Values, View};
+use super::view::{BLOCK, Values, View};
 use flate2::{Compress, Compression, FlushCompress, Status};
 use std::borrow::Cow;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -303,11 +303,7 @@ mod tests {
         for (attribute, field) in piece.data.point.iter().zip(&snapshot.fields) {
             let Attribute::DataArray(array) = attribute else { panic!("{attribute:?}") };
             assert_eq!((&array.name, array.num_comp()), (&field.name, field.components));
-            let bytes = |data: &super::super::Data| {
-                let mut all = Vec::new();
-                data.values().blocks::<()>(|block| Ok(all.extend_from_slice(block))).unwrap();
-                all
-            };
+            let bytes = |data: &super::super::Data| data.values().bytes().unwrap();
             let theirs = super::super::legacy::data(array.data.clone()).unwrap();
             assert!(theirs.type_name() == field.data.type_name() && bytes(&theirs) == bytes(&field.data));
         }
