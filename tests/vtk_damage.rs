@@ -58,13 +58,15 @@ fn files(dir: &Path) -> Vec<(&'static str, Vec<u8>)> {
     };
     let legacy = dir.join("legacy.vtk");
     io::write_legacy(&legacy, &cloud().view()).unwrap();
-    let ascii = std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/ascii.vtu")).unwrap();
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let kept = |name: &'static str| (name, std::fs::read(data.join(name)).unwrap());
     vec![
         write("raw.vtu", Encoding::Raw, false),
         write("raw_zlib.vtu", Encoding::Raw, true),
         write("base64.vtu", Encoding::Base64, false),
         write("base64_zlib.vtu", Encoding::Base64, true),
-        ("ascii.vtu", ascii.into_bytes()),
+        kept("ascii.vtu"),
+        kept("ascii.vts"),
         ("legacy.vtk", std::fs::read(legacy).unwrap()),
     ]
 }

@@ -9,6 +9,7 @@ The arrays of `case.ending` lie in `case.ending.arrays/`: one file of little-end
 
 import itertools
 import os
+import shutil
 import sys
 
 import meshio
@@ -202,6 +203,37 @@ def write_legacy(folder):
         expect(path, points, fields)
 
 
+def write_structured(folder):
+    points, fields = cloud(1000)
+    grid = vtk.vtkStructuredGrid()
+    grid.SetDimensions(10, 10, 10)
+    positions = vtk.vtkPoints()
+    positions.SetData(vtk_array("Points", points))
+    grid.SetPoints(positions)
+    for name, array in fields.items():
+        grid.GetPointData().AddArray(vtk_array(name, array))
+    for name in ["structured_plain.vts", "refused_zlib.vts"]:
+        writer = vtk.vtkXMLStructuredGridWriter()
+        writer.SetFileName(f"{folder}/{name}")
+        writer.SetInputData(grid)
+        writer.SetDataModeToBinary()
+        writer.SetHeaderTypeToUInt32()
+        if "plain" in name:
+            writer.SetCompressorTypeToNone()
+        assert writer.Write() == 1
+        expect(f"{folder}/{name}", points, fields)
+
+
+def copy_data(folder):
+    """The particles that this repository keeps, as meshio reads them."""
+    data = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data")
+    for name in ["dam_break.vtu", "glass_24.vtu"]:
+        path = f"{folder}/meshio_{name}"
+        shutil.copy(os.path.join(data, name), path)
+        mesh = meshio.read(path)
+        expect(path, mesh.points, mesh.point_data)
+
+
 def read_expected(path):
     folder = path + ".arrays"
     arrays = []
@@ -285,5 +317,7 @@ if __name__ == "__main__":
         write_defaults(folder)
         write_pieces(folder)
         write_legacy(folder)
+        write_structured(folder)
+        copy_data(folder)
     else:
         read(folder)
