@@ -26,6 +26,13 @@ pub enum Compressor {
     Lz4,
 }
 
+impl Layout {
+    /// The most values, in bytes, that so many bytes of a file can hold.
+    pub fn capacity(&self, bytes: u64) -> u64 {
+        bytes.saturating_mul(self.compressor.map_or(1, Compressor::best_ratio))
+    }
+}
+
 impl Compressor {
     /// The most that a byte can unfold into: deflate codes 258 bytes in two bits, lz4 255 bytes in one byte.
     fn best_ratio(self) -> u64 {
@@ -116,7 +123,7 @@ impl<'a> Payload<'a> {
         let packed_sizes = self.words(layout, blocks)?;
         let packed = packed_sizes.iter().try_fold(0u64, |sum, &s| sum.checked_add(s)).unwrap_or(u64::MAX);
         self.has(packed)?;
-        if bytes / compressor.best_ratio() > packed {
+        if bytes > layout.capacity(packed) {
             return Err(broken(format!("{packed} bytes cannot unpack to {bytes}")));
         }
         let mut values = zeroed(count)?;

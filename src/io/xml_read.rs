@@ -9,6 +9,7 @@ use super::split::{Appended, Split};
 use super::{broken, in_file, legacy, system};
 use crate::error::{Error, Result};
 use roxmltree::Node;
+use std::cell::Cell;
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
 use std::path::Path;
@@ -24,7 +25,9 @@ pub fn read(mut file: File, path: &Path, whole: bool) -> Result<Snapshot> {
     let grid = root.children().find(|c| c.has_tag_name(kind));
     let grid = grid.ok_or_else(|| broken(format!("it has no {kind} element")))?;
     match kind {
-        "UnstructuredGrid" | "PolyData" => Reader { file: &file, split: &split, layout: layout(root)? }.grid(grid),
+        "UnstructuredGrid" | "PolyData" => {
+            Reader { file: &file, split: &split, layout: layout(root)?, taken: Cell::new(0) }.grid(grid)
+        }
         "PUnstructuredGrid" | "PPolyData" if whole => parallel(grid, path),
         "PUnstructuredGrid" | "PPolyData" => Err(broken("a piece of a list is a list again")),
         "Collection" => Err(broken("it is a list of files; read one of those, or open it as a series")),
@@ -74,9 +77,22 @@ struct Reader<'a> {
     file: &'a File,
     split: &'a Split,
     layout: Layout,
+    /// Bytes of all arrays so far.
+    taken: Cell<u64>,
 }
 
 impl Reader<'_> {
+    /// Notes that an array of so many bytes is read. Together they cannot hold more than the file, unless it has been
+    /// forged to give the same bytes again and again.
+    fn take(&self, count: usize, size: usize) -> Result<()> {
+        let taken = (count as u64).saturating_mul(size as u64).saturating_add(self.taken.get());
+        self.taken.set(taken);
+        if taken > self.layout.capacity(self.split.length) {
+            return Err(broken("its arrays claim more than the file holds"));
+        }
+        Ok(())
+    }
+
     fn grid(&self, grid: Node) -> Result<Snapshot> {
         let pieces = grid.children().filter(|c| c.has_tag_name("Piece"));
         let mut snapshot = join(pieces.map(|piece| self.piece(piece)).collect::<Result<_>>()?)?;
@@ -137,7 +153,8 @@ impl Reader<'_> {
             Some("Int8" | "String") => self.payload(array).and_then(|p| p.text(&self.layout)),
             _ => return Ok(None),
         };
-        let bytes = bytes.map_err(|e| in_array(array, e))?;
+        let bytes: Vec<u8> = bytes.map_err(|e| in_array(array, e))?;
+        self.take(bytes.len(), 1)?;
         // VTK ends each of several strings with a NUL.
         Ok(String::from_utf8(bytes).ok().map(|text| text.trim_end_matches('\0').replace('\0', "\n")))
     }
@@ -172,7 +189,10 @@ impl ReadValues for Array<'_, '_, '_> {
     fn values<T: Element>(self) -> Result<Vec<T>> {
         match self.array.attribute("format") {
             Some("ascii") | None => ascii(text_of(self.array), self.count),
-            Some("binary" | "appended") => self.reader.payload(self.array)?.values(&self.reader.layout, self.count),
+            Some("binary" | "appended") => {
+                self.reader.take(self.count, size_of::<T>())?;
+                self.reader.payload(self.array)?.values(&self.reader.layout, self.count)
+            }
             Some(other) => Err(broken(format!("format '{other}' is unknown"))),
         }
     }
