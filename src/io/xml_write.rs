@@ -124,8 +124,7 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
         match self.options.encoding {
             Encoding::Base64 => {
                 writeln!(self.sink, " format=\"binary\">")?;
-                let mut text =
-                    Base64 { sink: &mut self.sink, waiting: Vec::with_capacity(2 * CHUNK), text: String::new() };
+                let mut text = Base64 { sink: &mut self.sink, waiting: Vec::with_capacity(CHUNK), text: String::new() };
                 store(values, self.options.zlib, &mut text, |t| t.finish())?;
                 writeln!(self.sink, "\n</DataArray>")
             }
