@@ -18,9 +18,15 @@ pub static WORDS: &[(&str, &str)] = &[
     ("mean", "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic)"),
     ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1 or rkl2 (default rkl2)"),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
-    ("change", "most that T may change in a sub-step of rkl1 and rkl2, relative to its spread; inf for no such limit (default 0.05)"),
+    (
+        "change",
+        "most that T may change in a sub-step of rkl1 and rkl2, relative to its spread; inf for no such limit (default 0.05)",
+    ),
     ("max_stages", "most stages of rkl1 and rkl2 before a step is cut into sub-steps"),
-    ("bounds", "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)"),
+    (
+        "bounds",
+        "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)",
+    ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     ("threads", "worker threads; 0: as many as the process may use (default 0)"),
     ("memory", "most bytes for weights, like 2e9 (default: what the machine has available)"),
@@ -75,7 +81,20 @@ impl Choices {
         let without = without(words.take("without"))?;
         words.done()?;
         let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
-        Ok(Choices { line, kernel, h_fac, operator, normalise, mean, method, options, change, threads, memory, without })
+        Ok(Choices {
+            line,
+            kernel,
+            h_fac,
+            operator,
+            normalise,
+            mean,
+            method,
+            options,
+            change,
+            threads,
+            memory,
+            without,
+        })
     }
 
     /// Whether a rule is switched off.
@@ -116,7 +135,9 @@ mod tests {
 
     #[test]
     fn words_choose_and_wrong_words_are_answered() {
-        let c = Choices::parse("heat  dim=2 kernel=c4 operator=kernel normalise=none integrator=euler without=same_h,frozen");
+        let c = Choices::parse(
+            "heat  dim=2 kernel=c4 operator=kernel normalise=none integrator=euler without=same_h,frozen",
+        );
         let c = c.unwrap();
         assert_eq!((c.kernel.name(), c.kernel.dim(), c.operator.name, c.normalise), ("C4", 2, "kernel", false));
         assert!(c.without("same_h") && !c.without("at_rest"));
@@ -138,8 +159,21 @@ mod tests {
     #[test]
     fn every_documented_word_is_read() {
         let values = [
-            "dim=2", "kernel=M4", "h_fac=1.2", "operator=kernel", "normalise=pair", "mean=geometric", "integrator=rkl1",
-            "stages=5", "change=0.1", "max_stages=9", "bounds=free", "max_applications=7", "threads=1", "memory=1e9", "without=same_h",
+            "dim=2",
+            "kernel=M4",
+            "h_fac=1.2",
+            "operator=kernel",
+            "normalise=pair",
+            "mean=geometric",
+            "integrator=rkl1",
+            "stages=5",
+            "change=0.1",
+            "max_stages=9",
+            "bounds=free",
+            "max_applications=7",
+            "threads=1",
+            "memory=1e9",
+            "without=same_h",
         ];
         assert_eq!(values.len(), WORDS.len());
         assert!(values.iter().zip(WORDS).all(|(v, (w, _))| v.split('=').next() == Some(w)));
