@@ -40,7 +40,7 @@ impl Motion<'_> {
     /// Advances `t` by exactly `dt` from `time`. Where the operator changes with T, bounds and schedule are made anew
     /// for each sub-step.
     pub fn advance(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
-        let reference = self.norm(|i| t[i] - t[0]);
+        let reference = self.norm(|i| t[i]);
         let mut done = 0.0;
         while done < dt && !t.is_empty() {
             let bounds = self.bounds(time + done, dt - done, t)?;
@@ -80,14 +80,10 @@ impl Motion<'_> {
         Ok((self.choices.change * reference / speed).max(method.limit(bounds)))
     }
 
-    /// Root mean square over the volume of what varies, scaled so that squares neither over- nor underflow.
+    /// The spread of a quantity over the volume.
     fn norm(&self, value: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
-        let (volume, n) = (self.heat.volume, self.heat.volume.len());
-        let largest = sum::max(self.pool, n, |i| value(i).abs()).max(f64::MIN_POSITIVE);
-        let total = sum::sum(self.pool, n, |i| volume[i]);
-        let mean = sum::sum(self.pool, n, |i| volume[i] / total * (value(i) / largest));
-        let deviation = |i: usize| value(i) / largest - mean;
-        largest * sum::sum(self.pool, n, |i| volume[i] / total * deviation(i) * deviation(i)).sqrt()
+        let volume = self.heat.volume;
+        sum::spread(self.pool, volume.len(), |i| volume[i], value)
     }
 
     /// Whether the operator stays the same while T changes.

@@ -107,9 +107,7 @@ impl State {
     fn spread(&self, t: &[f64]) -> f64 {
         let Some(inverse) = &self.inverse_capacity else { return 0.0 };
         let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
-        let total = sum::sum(&self.pool, t.len(), weight);
-        let mean = sum::sum(&self.pool, t.len(), |i| weight(i) / total * t[i]);
-        sum::sum(&self.pool, t.len(), |i| weight(i) / total * (t[i] - mean) * (t[i] - mean)).sqrt()
+        sum::spread(&self.pool, t.len(), weight, |i| t[i])
     }
 
     fn check(&self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
