@@ -34,7 +34,7 @@ impl State {
         self.cancel.store(false, Ordering::Relaxed);
         let start = Instant::now();
         if self.choices.without("at_rest") && self.steps > 0 {
-            self.drop_geometry();
+            self.forget_geometry();
         }
         let plan = self.prepare("step")?;
         let (mut t, time, applications) = (self.each(fields::T)?, self.time, self.applications);
