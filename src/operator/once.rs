@@ -246,8 +246,12 @@ impl Matrix {
             match kappa {
                 None => block.sums(t, part, &finish, |_, _, c| c),
                 Some((Mean::Harmonic, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Harmonic.of(k[i], k[j])),
-                Some((Mean::Arithmetic, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Arithmetic.of(k[i], k[j])),
-                Some((Mean::Geometric, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Geometric.of(k[i], k[j])),
+                Some((Mean::Arithmetic, k)) => {
+                    block.sums(t, part, &finish, |i, j, c| c * Mean::Arithmetic.of(k[i], k[j]))
+                }
+                Some((Mean::Geometric, k)) => {
+                    block.sums(t, part, &finish, |i, j, c| c * Mean::Geometric.of(k[i], k[j]))
+                }
             }
         });
     }

@@ -19,7 +19,10 @@ pub static WORDS: &[(&str, &str)] = &[
     ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1 or rkl2 (default rkl2)"),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     ("max_stages", "most stages of rkl1 and rkl2 before a step is cut into sub-steps"),
-    ("bounds", "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)"),
+    (
+        "bounds",
+        "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)",
+    ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     ("threads", "worker threads; 0: as many as the process may use (default 0)"),
     ("memory", "most bytes for weights, like 2e9 (default: what the machine has available)"),
@@ -107,7 +110,9 @@ mod tests {
 
     #[test]
     fn words_choose_and_wrong_words_are_answered() {
-        let c = Choices::parse("heat  dim=2 kernel=c4 operator=kernel normalise=none integrator=euler without=same_h,frozen");
+        let c = Choices::parse(
+            "heat  dim=2 kernel=c4 operator=kernel normalise=none integrator=euler without=same_h,frozen",
+        );
         let c = c.unwrap();
         assert_eq!((c.kernel.name(), c.kernel.dim(), c.operator.name, c.normalise), ("C4", 2, "kernel", false));
         assert!(c.without("same_h") && !c.without("at_rest"));
@@ -129,8 +134,20 @@ mod tests {
     #[test]
     fn every_documented_word_is_read() {
         let values = [
-            "dim=2", "kernel=M4", "h_fac=1.2", "operator=kernel", "normalise=pair", "mean=geometric", "integrator=rkl1",
-            "stages=5", "max_stages=9", "bounds=free", "max_applications=7", "threads=1", "memory=1e9", "without=same_h",
+            "dim=2",
+            "kernel=M4",
+            "h_fac=1.2",
+            "operator=kernel",
+            "normalise=pair",
+            "mean=geometric",
+            "integrator=rkl1",
+            "stages=5",
+            "max_stages=9",
+            "bounds=free",
+            "max_applications=7",
+            "threads=1",
+            "memory=1e9",
+            "without=same_h",
         ];
         assert_eq!(values.len(), WORDS.len());
         assert!(values.iter().zip(WORDS).all(|(v, (w, _))| v.split('=').next() == Some(w)));

@@ -74,7 +74,13 @@ impl Plan {
             add("density", setup, 16.0 * n, pairs, what.into());
         }
         let evaluations = if self.leaves_out("same_h") { "one kernel evaluation" } else { "two kernel evaluations" };
-        add("weights", setup, pairs * 12.0 + 4.0 * n, pairs, format!("{} w_ab, {evaluations} per pair", facts.operator));
+        add(
+            "weights",
+            setup,
+            pairs * 12.0 + 4.0 * n,
+            pairs,
+            format!("{} w_ab, {evaluations} per pair", facts.operator),
+        );
         if choices.normalise {
             add("normalise", setup, 8.0 * n, pairs, "pairs scaled by the mean of 1/K_a and 1/K_b".into());
         }
@@ -86,7 +92,13 @@ impl Plan {
         if facts.kappa_of_t {
             add("kappa", When::EachStage, 8.0 * n, 0.0, "kappa(T)".into());
         }
-        add("stages", When::EachStage, facts.buffers * 8.0 * n, pairs, format!("{}: rows of weights", facts.integrator));
+        add(
+            "stages",
+            When::EachStage,
+            facts.buffers * 8.0 * n,
+            pairs,
+            format!("{}: rows of weights", facts.integrator),
+        );
         if !self.leaves_out("no_wall") {
             add("surface", When::EachStage, 48.0 * facts.exchanging as f64, 0.0, "exchange with the outside".into());
         }

@@ -1,9 +1,9 @@
 //! The passes that make what the stages need: sort, density, weights, normalise, fold, capacity, surface, bound. Each
 //! runs only where its product is missing.
 
-use super::state::{Geometry, Input, State, Weights};
 use super::Plan;
 use super::motion::Motion;
+use super::state::{Geometry, Input, State, Weights};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Slot};

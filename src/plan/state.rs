@@ -230,7 +230,8 @@ impl State {
         }
         let mut volume = 1.0;
         for axis in 0..self.dim() {
-            let range = (0..x.len()).map(|i| x.at(i, axis)).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+            let range =
+                (0..x.len()).map(|i| x.at(i, axis)).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
             volume *= if self.domain.periodic[axis] { self.domain.length(axis) } else { (range.1 - range.0).max(0.0) };
         }
         radius * self.choices.h_fac * (volume / x.len().max(1) as f64).powf(1.0 / self.dim() as f64)
@@ -299,7 +300,9 @@ impl State {
             return 0;
         }
         let flows = |i: usize| {
-            [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY].iter().any(|&s| self.inputs[s].at(i).unwrap_or(0.0) != 0.0)
+            [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY]
+                .iter()
+                .any(|&s| self.inputs[s].at(i).unwrap_or(0.0) != 0.0)
         };
         (0..self.len()).filter(|&i| flows(i)).count()
     }
