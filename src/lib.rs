@@ -36,5 +36,7 @@ pub mod solver;
 
 pub mod io;
 
+pub mod study;
+
 pub use array::{Strided, StridedMut};
 pub use solver::Solver;

@@ -1,0 +1,299 @@
+//! From a scene to a solver: particles, quantities, marks.
+
+use super::exact::{self, Exact};
+use super::lattice;
+use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
+use crate::array::Strided;
+use crate::error::{Error, Result};
+use crate::io::{self, Snapshot};
+use crate::model::conductivity::LAWS;
+use crate::solver::Solver;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// A free surface is where h Σ V w r, 0 inside, is longer than this.
+const SURFACE: f64 = 0.5;
+
+pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
+    let solver = Solver::new(&scene.words)?;
+    let mut setup = Setup { scene, snapshot: None, exact: None, x: Vec::new(), cell: None, solver };
+    setup.space()?;
+    setup.particles(folder)?;
+    setup.exact = setup.find_exact()?;
+    setup.solver.set_number("time", scene.time.start)?;
+    setup.quantities()?;
+    for mark in &scene.mark {
+        setup.weigh()?;
+        let chosen = setup.chosen(&mark.place)?;
+        for (name, value) in &mark.set {
+            setup.mark(name, value, &chosen)?;
+        }
+    }
+    setup.weigh()?;
+    Ok((setup.solver, setup.exact))
+}
+
+struct Setup<'a> {
+    scene: &'a Scene,
+    snapshot: Option<Snapshot>,
+    exact: Option<Exact>,
+    /// `dim` coordinates per particle, as they were given.
+    x: Vec<f64>,
+    /// Volume of a particle of a lattice.
+    cell: Option<f64>,
+    solver: Solver,
+}
+
+impl Setup<'_> {
+    fn space(&mut self) -> Result<()> {
+        let Some(space) = &self.scene.space else { return Ok(()) };
+        let periodic = match &space.periodic {
+            Periodic::All(all) => vec![*all; self.solver.dim()],
+            Periodic::Each(each) => each.clone(),
+        };
+        self.solver.set_box(&space.lo, &space.hi, &periodic)
+    }
+
+    fn particles(&mut self, folder: &Path) -> Result<()> {
+        let dim = self.solver.dim();
+        let Particles { file, lattice: name, n, jitter, seed } = &self.scene.particles;
+        if let Some(file) = file {
+            let snapshot = io::read(folder.join(file))?;
+            self.solver.set_snapshot(&snapshot)?;
+            self.x = snapshot.points.iter().flat_map(|p| p[..dim].iter().copied()).collect();
+            self.snapshot = Some(snapshot);
+        } else if let (Some(name), Some(n), Some(space)) = (name, n, &self.scene.space) {
+            self.x = lattice::find(name, dim)?.fill(&space.lo, &space.hi, *n as usize)?;
+            let volume: f64 = space.lo.iter().zip(&space.hi).map(|(lo, hi)| hi - lo).product();
+            let cell = volume * dim as f64 / self.x.len() as f64;
+            lattice::jitter(&mut self.x, jitter * cell.powf(1.0 / dim as f64), *seed);
+            self.solver.set_particles(Strided::new("x", &self.x, self.x.len() / dim, dim, dim)?)?;
+            self.cell = Some(cell);
+        }
+        Ok(())
+    }
+
+    fn find_exact(&self) -> Result<Option<Exact>> {
+        let Some(wanted) = &self.scene.exact else { return Ok(None) };
+        let numbers = |numbers: &Numbers| match numbers {
+            Numbers::One(one) => vec![*one],
+            Numbers::List(list) => list.clone(),
+        };
+        let given = wanted.parameters.iter().map(|(name, values)| (name.clone(), numbers(values))).collect();
+        let number = |(name, value): (&String, &Value)| match value {
+            Value::Number(v) => Some((name.clone(), *v)),
+            _ => None,
+        };
+        let material: BTreeMap<String, f64> = self.scene.set.iter().filter_map(number).collect();
+        exact::find(&wanted.name, self.solver.dim(), given, &material).map(Some)
+    }
+
+    fn quantities(&mut self) -> Result<()> {
+        let set = &self.scene.set;
+        if self.cell.is_some() && !set.contains_key("rho") {
+            self.solver.set_number("rho", 1.0)?;
+        }
+        for (name, value) in set {
+            match value {
+                Value::Number(v) => self.solver.set_number(name, *v)?,
+                Value::Flag(on) => self.solver.set_number(name, f64::from(*on))?,
+                Value::Text(text) if is_law(name, text) => self.solver.set_law(name, text)?,
+                Value::Text(text) => {
+                    let values = self.array(name, text)?;
+                    self.solver.set(name, Strided::packed(&values))?;
+                }
+            }
+        }
+        if self.exact.is_some() && !set.contains_key("T") {
+            let values = self.array("T", "exact")?;
+            self.solver.set("T", Strided::packed(&values))?;
+        }
+        Ok(())
+    }
+
+    /// The masses of a lattice, rho times the volume of a particle, unless the scene sets them.
+    fn weigh(&mut self) -> Result<()> {
+        let Some(cell) = self.cell.filter(|_| !self.scene.set.contains_key("m")) else { return Ok(()) };
+        match self.scene.set.get("rho") {
+            // rho as an array of the solver is there only once masses are: start from any.
+            _ if self.rho_varies() => {
+                self.solver.set_number("m", cell)?;
+                let m: Vec<f64> = self.solver.get_all("rho")?.iter().map(|rho| rho * cell).collect();
+                self.solver.set("m", Strided::packed(&m))
+            }
+            Some(Value::Number(rho)) => self.solver.set_number("m", rho * cell),
+            _ => self.solver.set_number("m", cell),
+        }
+    }
+
+    fn rho_varies(&self) -> bool {
+        let text = matches!(self.scene.set.get("rho"), Some(Value::Text(_)));
+        text || self.scene.mark.iter().any(|mark| mark.set.contains_key("rho"))
+    }
+
+    /// What a text stands for, per particle: the exact solution at the start, or an array of the file.
+    fn array(&self, name: &str, text: &str) -> Result<Vec<f64>> {
+        if let Some(exact) = self.exact.as_ref().filter(|_| text == "exact") {
+            return Ok(at_all(exact, &self.x, self.solver.dim(), self.scene.time.start));
+        }
+        let fields = || self.snapshot.iter().flat_map(|s| &s.fields);
+        let field = fields().find(|f| f.name == text).ok_or_else(|| {
+            let known: Vec<&str> =
+                fields().map(|f| f.name.as_str()).chain(self.exact.iter().map(|_| "exact")).collect();
+            Error::unknown(&format!("array for {name}"), text, known)
+        })?;
+        if field.components != 1 {
+            return Err(Error::bad(text, format!("{} components", field.components), "a quantity needs one"));
+        }
+        field.data.to_f64()
+    }
+
+    /// Sets a quantity of the chosen particles and leaves it as it is on the others.
+    fn mark(&mut self, name: &str, value: &Value, chosen: &[bool]) -> Result<()> {
+        let new = match value {
+            Value::Number(v) => vec![*v; chosen.len()],
+            Value::Flag(on) => vec![f64::from(*on); chosen.len()],
+            Value::Text(text) if is_law(name, text) => {
+                return Err(Error::bad(name, format!("'{text}'"), "a law is for all particles: put it in [set]"));
+            }
+            Value::Text(text) => self.array(name, text)?,
+        };
+        let mut values = self.solver.get_all(name)?;
+        values.iter_mut().zip(&new).zip(chosen).filter(|(_, chosen)| **chosen).for_each(|((v, new), _)| *v = *new);
+        self.solver.set(name, Strided::packed(&values))
+    }
+
+    fn chosen(&mut self, place: &Where) -> Result<Vec<bool>> {
+        let dim = self.solver.dim();
+        let mut chosen = vec![true; self.solver.len()];
+        let mut keep = |holds: &dyn Fn(usize) -> bool| {
+            chosen.iter_mut().enumerate().for_each(|(i, chosen)| *chosen &= holds(i));
+        };
+        let inside = |range: [f64; 2], v: f64| v >= range[0] && v <= range[1];
+        for (axis, range) in [place.x, place.y, place.z].into_iter().enumerate() {
+            match range {
+                Some(range) if axis < dim => keep(&|i| inside(range, self.x[i * dim + axis])),
+                Some(_) => return Err(Error::bad("where", ["x", "y", "z"][axis], &format!("the scene has dim={dim}"))),
+                None => {}
+            }
+        }
+        if let Some(range) = place.r {
+            let centre = |axis: usize| place.centre.get(axis).copied().unwrap_or(0.0);
+            let r2 = |i: usize| (0..dim).map(|a| (self.x[i * dim + a] - centre(a)).powi(2)).sum::<f64>();
+            keep(&|i| inside(range, r2(i).sqrt()));
+        }
+        if let Some(picture) = &place.picture {
+            let frame = self.frame(place)?;
+            keep(&|i| painted(picture, frame, self.x[i * dim], self.x[i * dim + 1]));
+        }
+        match (&place.field, place.equals) {
+            (Some(field), Some(value)) => {
+                let values = self.array("where", field)?;
+                keep(&|i| values[i] == value);
+            }
+            (None, None) => {}
+            _ => return Err(Error::bad("where", "incomplete", "field and equals go together")),
+        }
+        if let Some(wanted) = place.surface {
+            let moments = self.solver.get_all("first_moment")?;
+            keep(&|i| (moments[i * dim..(i + 1) * dim].iter().map(|m| m * m).sum::<f64>().sqrt() > SURFACE) == wanted);
+        }
+        Ok(chosen)
+    }
+
+    /// The rectangle that a picture is stretched over: [x, y] of the condition, or else the box.
+    fn frame(&self, place: &Where) -> Result<[[f64; 2]; 2]> {
+        let bounds = |axis: usize| self.scene.space.as_ref().and_then(|s| Some([*s.lo.get(axis)?, *s.hi.get(axis)?]));
+        match (place.x.or(bounds(0)), place.y.or(bounds(1))) {
+            (Some(x), Some(y)) if self.solver.dim() >= 2 => Ok([x, y]),
+            _ => Err(Error::bad("picture", "without a frame", "it needs dim=2 or 3, and x and y or a [box]")),
+        }
+    }
+}
+
+/// Whether (x, y) lies under a letter of the picture; its first line is at the top.
+fn painted(picture: &[String], [across, up]: [[f64; 2]; 2], x: f64, y: f64) -> bool {
+    let width = picture.iter().map(|line| line.chars().count()).max().unwrap_or(0);
+    let share = |v: f64, [from, to]: [f64; 2]| (v - from) / (to - from);
+    let (column, row) = (share(x, across) * width as f64, (1.0 - share(y, up)) * picture.len() as f64);
+    if column < 0.0 || row < 0.0 {
+        return false;
+    }
+    let letter = picture.get(row as usize).and_then(|line| line.chars().nth(column as usize));
+    letter.is_some_and(|c| !c.is_whitespace())
+}
+
+/// An exact solution at every particle.
+pub fn at_all(exact: &Exact, x: &[f64], dim: usize, t: f64) -> Vec<f64> {
+    let place = |p: &[f64]| std::array::from_fn(|a| p.get(a).copied().unwrap_or(0.0));
+    x.chunks(dim).map(|p| exact(place(p), t)).collect()
+}
+
+fn is_law(name: &str, text: &str) -> bool {
+    let first = text.split_whitespace().next();
+    name == "kappa" && LAWS.iter().any(|(law, _)| Some(*law) == first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(more: &str) -> Scene {
+        let text = format!(
+            "words = \"heat dim=2 threads=1\"\n[box]\nlo = [0, 0]\nhi = [2, 1]\n[particles]\nlattice = \"square\"\nn = 20\n\
+             [set]\nT = 1\nkappa = 2\nrho = 3\n[time]\nend = 1\n{more}"
+        );
+        Scene::parse("test", &text).unwrap()
+    }
+
+    fn solver(more: &str) -> Result<Solver> {
+        setup(&scene(more), Path::new(".")).map(|(solver, _)| solver)
+    }
+
+    #[test]
+    fn masses_fill_the_box_and_follow_rho() {
+        let mut s = solver("").unwrap();
+        assert_eq!(s.len(), 200);
+        assert!((s.get_all("m").unwrap().iter().sum::<f64>() - 6.0).abs() < 1e-12);
+        let mut s = solver("[[mark]]\nwhere = { x = [1, 2] }\nset = { rho = 5, kappa = 7 }").unwrap();
+        let (m, kappa) = (s.get_all("m").unwrap(), s.get_all("kappa").unwrap());
+        assert!((m.iter().sum::<f64>() - 8.0).abs() < 1e-12);
+        assert_eq!(kappa.iter().filter(|k| **k == 7.0).count(), 100);
+    }
+
+    #[test]
+    fn conditions_choose_together() {
+        let fixed = |place: &str| -> usize {
+            let mut s = solver(&format!("[[mark]]\nwhere = {place}\nset = {{ fixed = true }}")).unwrap();
+            s.get_all("fixed").unwrap().iter().filter(|f| **f != 0.0).count()
+        };
+        assert_eq!(fixed("{}"), 200);
+        assert_eq!(fixed("{ x = [0, 0.5], y = [0.5, 1] }"), 25);
+        assert_eq!(fixed("{ r = [0, 0.11], centre = [1, 0.5] }"), 4);
+        // Two letters wide, two high: the left half of the upper row, the right half of the lower.
+        assert_eq!(fixed("{ picture = [\"# \", \" #\"] }"), 100);
+        assert_eq!(fixed("{ picture = [\"# \", \" #\"], x = [0, 1], y = [0, 1] }"), 50);
+        assert_eq!(fixed("{ picture = [\"#\"], x = [0, 1] }"), 100);
+        // The outermost rows: 2 (20 + 10) - 4.
+        assert_eq!(fixed("{ surface = true }"), 56);
+        assert_eq!(fixed("{ surface = false }"), 144);
+    }
+
+    #[test]
+    fn what_a_scene_cannot_mean_is_said() {
+        for (more, expected) in [
+            ("[[mark]]\nwhere = {}\nset = { kapa = 1 }", "did you mean 'kappa'"),
+            ("[[mark]]\nwhere = {}\nset = { grad_T = 1 }", "computed"),
+            ("[[mark]]\nwhere = { z = [0, 1] }\nset = { T = 1 }", "dim=2"),
+            ("[[mark]]\nwhere = { field = \"type\" }\nset = { T = 1 }", "go together"),
+            ("[[mark]]\nwhere = {}\nset = { kappa = -1 }", "kappa[0] is -1"),
+            ("[[mark]]\nwhere = {}\nset = { kappa = \"power n=2\" }", "for all particles"),
+            ("[[mark]]\nwhere = {}\nset = { T = \"teperature\" }", "unknown array for T"),
+            ("[exact]\nname = \"sin\"", "did you mean 'sine'"),
+            ("[exact]\nname = \"sine\"", "waves of sine is missing"),
+        ] {
+            let text = solver(more).err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(text.contains(expected), "{more}: {text}");
+        }
+    }
+}
