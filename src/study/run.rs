@@ -106,7 +106,14 @@ impl Study {
             ns_per_pair: seconds.per_application(&work, solver.len() as f64 * neighbours),
             work,
             seconds,
-            left_out: rules.iter().map(|r| LeftOut { rule: r.name, reason: r.reason, same_bits: r.exact }).collect(),
+            left_out: rules
+                .iter()
+                .map(|r| LeftOut {
+                    rule: r.name,
+                    reason: r.reason,
+                    same_bits: r.same == crate::plan::rules::Same::Bits,
+                })
+                .collect(),
             series: writer.as_ref().map(|w| w.pvd.display().to_string()),
             snapshots: writer.map_or(0, |w| w.count),
         })
