@@ -231,7 +231,7 @@ impl State {
             return Err(Error::OutOfOrder { call: "rate".into(), missing: "set_particles".into() });
         };
         let each = |slot: Slot, wanted: bool| self.inputs[slot].view(if wanted { n } else { 0 });
-        let by_pair = !uniform && !self.law.is_some() && self.kappa_host.is_none() && !weights.folded;
+        let by_pair = !uniform && self.law.is_none() && self.kappa_host.is_none() && !weights.folded;
         let kappa = each(fields::KAPPA, by_pair)?;
         let source = each(fields::SOURCE, !plan.leaves_out("no_source"))?;
         let conductivity = match (&mut self.kappa_host, &self.law, &self.inputs[fields::KAPPA]) {
