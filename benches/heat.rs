@@ -121,7 +121,9 @@ fn median(mut values: Vec<f64>) -> f64 {
 
 /// One row per size and number of threads; rivals in turn.
 fn table(sizes: &[usize]) {
-    println!("\n particles threads neighbours  ns/particle  ns/pair  scipy ns  ours/scipy  set-up/steps  B/particle  of read bandwidth");
+    println!(
+        "\n particles threads neighbours  ns/particle  ns/pair  scipy ns  ours/scipy  set-up/steps  B/particle  of read bandwidth"
+    );
     let array = vec![1.0f64; 1 << 25];
     for &n in sizes {
         let rival = Scipy::new(n);
