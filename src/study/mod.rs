@@ -4,6 +4,7 @@
 //! |---|---|
 //! | `exact` | exact solutions, by name |
 //! | `lattice` | particles on lattices |
+//! | `surface` | particles at a free surface |
 //! | `scene` | the scene file: every key, what it means, what is wrong with it |
 //! | `setup` | from a scene to a solver |
 //! | `run` | the run and its snapshots |
@@ -19,3 +20,4 @@ pub mod run;
 pub mod scene;
 #[cfg(feature = "cli")]
 mod setup;
+pub mod surface;

@@ -1,18 +1,16 @@
 //! From a scene to a solver: particles, quantities, marks.
 
 use super::exact::{self, Exact};
-use super::lattice;
 use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
+use super::{lattice, surface};
 use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::io::{self, Snapshot};
 use crate::model::conductivity::LAWS;
 use crate::solver::Solver;
+use crate::space::Domain;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// A free surface is where h Σ V w r, 0 inside, is longer than this.
-const SURFACE: f64 = 0.5;
 
 pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
     let solver = Solver::new(&scene.words)?;
@@ -46,12 +44,30 @@ struct Setup<'a> {
 
 impl Setup<'_> {
     fn space(&mut self) -> Result<()> {
-        let Some(space) = &self.scene.space else { return Ok(()) };
-        let periodic = match &space.periodic {
-            Periodic::All(all) => vec![*all; self.solver.dim()],
-            Periodic::Each(each) => each.clone(),
-        };
-        self.solver.set_box(&space.lo, &space.hi, &periodic)
+        match &self.scene.space {
+            Some(space) => self.solver.set_box(&space.lo, &space.hi, &self.periodic()),
+            None => Ok(()),
+        }
+    }
+
+    fn periodic(&self) -> Vec<bool> {
+        match self.scene.space.as_ref().map(|s| &s.periodic) {
+            Some(Periodic::Each(each)) => each.clone(),
+            Some(Periodic::All(all)) => vec![*all; self.solver.dim()],
+            None => vec![false; self.solver.dim()],
+        }
+    }
+
+    fn domain(&self) -> Result<Domain> {
+        let open = || Ok(Domain::open(self.solver.dim()));
+        self.scene.space.as_ref().map_or_else(open, |s| Domain::new(&s.lo, &s.hi, &self.periodic()))
+    }
+
+    /// (m/rho)^(1/nu)
+    fn spacing(&mut self) -> Result<Vec<f64>> {
+        let power = 1.0 / self.solver.dim() as f64;
+        let (m, rho) = (self.solver.get_all("m")?, self.solver.get_all("rho")?);
+        Ok(m.iter().zip(rho).map(|(m, rho)| (m / rho).powf(power)).collect())
     }
 
     fn particles(&mut self, folder: &Path) -> Result<()> {
@@ -195,8 +211,9 @@ impl Setup<'_> {
             _ => return Err(Error::bad("where", "incomplete", "field and equals go together")),
         }
         if let Some(wanted) = place.surface {
-            let moments = self.solver.get_all("first_moment")?;
-            keep(&|i| (moments[i * dim..(i + 1) * dim].iter().map(|m| m * m).sum::<f64>().sqrt() > SURFACE) == wanted);
+            let spacing = self.spacing()?;
+            let free = surface::free(&self.domain()?, &self.x, &spacing)?;
+            keep(&|i| free[i] == wanted);
         }
         Ok(chosen)
     }
