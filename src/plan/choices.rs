@@ -18,6 +18,10 @@ pub static WORDS: &[(&str, &str)] = &[
     ("mean", "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic)"),
     ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1 or rkl2 (default rkl2)"),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
+    (
+        "change",
+        "most that T may change in a sub-step of rkl1 and rkl2, relative to its spread; inf for no such limit (default 0.05)",
+    ),
     ("max_stages", "most stages of rkl1 and rkl2 before a step is cut into sub-steps"),
     (
         "bounds",
@@ -29,6 +33,11 @@ pub static WORDS: &[(&str, &str)] = &[
     ("without", "rules of the plan to switch off, separated by commas"),
 ];
 
+/// Default of `change`. Measured on 20 %-jittered 64² and 128² particles, one step of 180 to 1600 explicit limits, error
+/// in time relative to the spread of T at the beginning: a smooth mode 3e-2 without a limit, 5e-4 at 0.1, 2e-4 at 0.05;
+/// a hot disc 0.3, 2e-3 and 5e-4, for 1.2 to 2 times the applications and still a fifth of ssprk3's.
+const CHANGE: f64 = 0.05;
+
 pub struct Choices {
     pub line: String,
     pub kernel: Kernel,
@@ -38,6 +47,8 @@ pub struct Choices {
     pub mean: Mean,
     pub method: &'static Method,
     pub options: Options,
+    /// Most relative change of T in a sub-step of a stabilised method.
+    pub change: f64,
     pub threads: usize,
     pub memory: Option<u64>,
     without: Vec<String>,
@@ -64,12 +75,26 @@ impl Choices {
         let mean = Mean::find(words.take("mean").unwrap_or("harmonic"))?;
         let method = integrator::find(words.take("integrator").unwrap_or("rkl2"))?;
         let options = options(&mut words)?;
+        let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
         let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
         let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
         let without = without(words.take("without"))?;
         words.done()?;
         let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
-        Ok(Choices { line, kernel, h_fac, operator, normalise, mean, method, options, threads, memory, without })
+        Ok(Choices {
+            line,
+            kernel,
+            h_fac,
+            operator,
+            normalise,
+            mean,
+            method,
+            options,
+            change,
+            threads,
+            memory,
+            without,
+        })
     }
 
     /// Whether a rule is switched off.
@@ -142,6 +167,7 @@ mod tests {
             "mean=geometric",
             "integrator=rkl1",
             "stages=5",
+            "change=0.1",
             "max_stages=9",
             "bounds=free",
             "max_applications=7",

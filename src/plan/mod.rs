@@ -127,8 +127,8 @@ impl fmt::Display for Plan {
                 When::EachStep => "each step",
                 When::EachStage => "each stage",
             };
-            let size = |v: f64, unit: &str| if v == 0.0 { String::new() } else { format!("{} {unit}", readable(v)) };
-            let (bytes, pairs) = (size(pass.bytes, "B"), size(pass.pairs, "pairs"));
+            let size = |v: f64, unit: &str| if v == 0.0 { String::new() } else { format!("{}{unit}", readable(v)) };
+            let (bytes, pairs) = (size(pass.bytes, "B"), size(pass.pairs, " pairs"));
             let line = format!("  {when:<11}{:<10}{bytes:>9} {pairs:>12}  {}", pass.name, pass.about);
             writeln!(f, "{}", line.trim_end())?;
         }
@@ -138,8 +138,7 @@ impl fmt::Display for Plan {
             }
             writeln!(f, "{title}")?;
             for rule in rules {
-                let exact = if rule.exact { "same bits" } else { "same to rounding" };
-                writeln!(f, "  {:<14}{} ({exact})", rule.name, rule.reason)?;
+                writeln!(f, "  {:<14}{} ({})", rule.name, rule.reason, rule.same)?;
             }
             Ok(())
         };
@@ -153,6 +152,6 @@ pub fn readable(v: f64) -> String {
     let scales = [(1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k")];
     match scales.iter().find(|(scale, _)| v >= *scale) {
         Some((scale, unit)) => format!("{:.1}{unit}", v / scale),
-        None => format!("{v:.0}"),
+        None => format!("{v:.0} "),
     }
 }

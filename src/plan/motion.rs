@@ -40,10 +40,12 @@ impl Motion<'_> {
     /// Advances `t` by exactly `dt` from `time`. Where the operator changes with T, bounds and schedule are made anew
     /// for each sub-step.
     pub fn advance(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        let reference = self.norm(|i| t[i]);
         let mut done = 0.0;
         while done < dt && !t.is_empty() {
             let bounds = self.bounds(time + done, dt - done, t)?;
-            let (method, schedule) = self.schedule(dt - done, bounds)?;
+            let part = self.practical_limit(time + done, t, bounds, reference)?.min(dt - done);
+            let (method, schedule) = self.schedule(part, bounds)?;
             if report.substeps == 0 {
                 report.limit = explicit_limit(bounds);
             }
@@ -57,9 +59,31 @@ impl Motion<'_> {
                 self.tell(time, dt, done + schedule.start(k + 1))?;
             }
             self.timers.add("stages", start.elapsed());
-            done = if steps == schedule.substeps { dt } else { done + schedule.start(steps) };
+            let to_the_end = part == dt - done && steps == schedule.substeps;
+            done = if to_the_end { dt } else { done + schedule.start(steps) };
         }
         Ok(())
+    }
+
+    /// The longest sub-step of a stabilised method in which T changes, at the present rate, by no more than `change`
+    /// times its spread at the beginning. Stability allows more, but then one sub-step of second order would have to
+    /// follow a decay by several factors of e, and modes that it cannot resolve would ring instead of dying (the
+    /// practical step limit of Caplan et al. 2024 has the same purpose). Never below what three stages can do.
+    fn practical_limit(&mut self, time: f64, t: &[f64], bounds: Bounds, reference: f64) -> Result<f64> {
+        let (method, options) = (self.choices.method, &self.choices.options);
+        if !method.is_stabilised() || options.stages.is_some() || self.choices.change.is_infinite() {
+            return Ok(f64::INFINITY);
+        }
+        let mut rate = memory::filled("rate", t.len(), 0.0)?;
+        self.heat.rate(time, t, &mut rate)?;
+        let speed = self.norm(|i| rate[i]);
+        Ok((self.choices.change * reference / speed).max(method.limit(bounds)))
+    }
+
+    /// The spread of a quantity over the volume.
+    fn norm(&self, value: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
+        let volume = self.heat.volume;
+        sum::spread(self.pool, volume.len(), |i| volume[i], value)
     }
 
     /// Whether the operator stays the same while T changes.

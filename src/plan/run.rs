@@ -34,7 +34,7 @@ impl State {
         self.cancel.store(false, Ordering::Relaxed);
         let start = Instant::now();
         if self.choices.without("at_rest") && self.steps > 0 {
-            self.drop_geometry();
+            self.forget_geometry();
         }
         let plan = self.prepare("step")?;
         let (mut t, time, applications) = (self.each(fields::T)?, self.time, self.applications);
@@ -107,9 +107,7 @@ impl State {
     fn spread(&self, t: &[f64]) -> f64 {
         let Some(inverse) = &self.inverse_capacity else { return 0.0 };
         let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
-        let total = sum::sum(&self.pool, t.len(), weight);
-        let mean = sum::sum(&self.pool, t.len(), |i| weight(i) / total * t[i]);
-        sum::sum(&self.pool, t.len(), |i| weight(i) / total * (t[i] - mean) * (t[i] - mean)).sqrt()
+        sum::spread(&self.pool, t.len(), weight, |i| t[i])
     }
 
     fn check(&self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {

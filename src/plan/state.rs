@@ -257,6 +257,11 @@ impl State {
     /// Positions, masses, densities or smoothing lengths changed.
     pub fn drop_geometry(&mut self) {
         self.moves |= self.steps > 0;
+        self.forget_geometry();
+    }
+
+    /// Makes the next step build everything anew.
+    pub fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
         (self.surface, self.bounds) = (None, None);
     }

@@ -137,8 +137,8 @@ impl Seconds {
 pub struct LeftOut {
     pub rule: &'static str,
     pub reason: &'static str,
-    /// Leaving it out changes no bit of the result; otherwise only its rounding.
-    pub same_bits: bool,
+    /// How far the result is the same without it: `same bits`, `same to rounding`, …
+    pub result: String,
 }
 
 impl fmt::Display for Report {
@@ -183,9 +183,8 @@ impl fmt::Display for Report {
         for (name, seconds) in passes.iter().filter(|(_, s)| *s > 0.0) {
             row("", format!("{name:<10}{seconds:>9.4} s {:>5.1} %", 100.0 * seconds / total))?;
         }
-        for (i, LeftOut { rule, reason, same_bits }) in self.left_out.iter().enumerate() {
-            let bits = if *same_bits { "same bits" } else { "same to rounding" };
-            row(if i == 0 { "left out" } else { "" }, format!("{rule}: {reason} ({bits})"))?;
+        for (i, LeftOut { rule, reason, result }) in self.left_out.iter().enumerate() {
+            row(if i == 0 { "left out" } else { "" }, format!("{rule}: {reason} ({result})"))?;
         }
         match &self.series {
             Some(series) => row("wrote", format!("{series} ({} snapshots)", self.snapshots)),

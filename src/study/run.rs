@@ -83,7 +83,9 @@ impl Study {
             ns_per_pair: seconds.per_application(&work, n * neighbours),
             work,
             seconds,
-            left_out: left_out.map(|r| LeftOut { rule: r.name, reason: r.reason, same_bits: r.exact }).collect(),
+            left_out: left_out
+                .map(|r| LeftOut { rule: r.name, reason: r.reason, result: r.same.to_string() })
+                .collect(),
             series: writer.as_ref().map(|w| w.pvd.display().to_string()),
             snapshots: writer.map_or(0, |w| w.count),
         })
