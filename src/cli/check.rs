@@ -24,12 +24,10 @@ pub fn text(path: &Path) -> Result<String> {
     for (axis, name) in ["x", "y", "z"].into_iter().enumerate().take(dim) {
         let _ = writeln!(text, "  {name:<12}{}", Range::of(snapshot.points.iter().map(|p| p[axis])));
     }
-    let _ = match spacing(&snapshot, dim)? {
-        Some((least, mean)) => {
-            writeln!(text, "  spacing     nearest neighbour {mean:.4e} on average, {least:.4e} at least")
-        }
-        None => Ok(()),
-    };
+    if let Some((least, mean)) = spacing(&snapshot, dim)? {
+        let note = if least == 0.0 { " (some share one place)" } else { "" };
+        let _ = writeln!(text, "  spacing     nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}");
+    }
     for field in &snapshot.fields {
         let _ = writeln!(text, "  {:<12}{}", field.name, describe(field));
     }

@@ -264,7 +264,7 @@ impl Scene {
 
 /// What TOML found wrong, in our words: the line, and the nearest known key.
 fn explain(name: &str, text: &str, error: &toml::de::Error) -> Error {
-    let line = error.span().map_or(1, |span| text[..span.start.min(text.len())].lines().count().max(1));
+    let line = error.span().map_or(1, |span| 1 + text.bytes().take(span.start).filter(|b| *b == b'\n').count());
     let message = error.message().trim().replace('\n', ", ");
     // serde says: unknown field `a`, expected one of `b`, `c`.
     let quoted: Vec<String> = message.split('`').skip(1).step_by(2).map(String::from).collect();

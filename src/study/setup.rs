@@ -7,6 +7,7 @@ use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::io::{self, Snapshot};
 use crate::model::conductivity::LAWS;
+use crate::model::fields::{self, NUMBERS};
 use crate::solver::Solver;
 use crate::space::Domain;
 use std::collections::BTreeMap;
@@ -15,6 +16,7 @@ use std::path::Path;
 pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
     let solver = Solver::new(&scene.words)?;
     let mut setup = Setup { scene, snapshot: None, exact: None, x: Vec::new(), cell: None, solver };
+    known(scene.set.keys().chain(scene.mark.iter().flat_map(|mark| mark.set.keys())))?;
     setup.space()?;
     setup.particles(folder)?;
     setup.exact = setup.find_exact()?;
@@ -29,6 +31,12 @@ pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
     }
     setup.weigh()?;
     Ok((setup.solver, setup.exact))
+}
+
+/// Every name is that of a quantity that can be set.
+fn known<'a>(names: impl Iterator<Item = &'a String>) -> Result<()> {
+    let mut others = names.filter(|name| !NUMBERS.iter().any(|n| n.name == name.as_str()));
+    others.try_for_each(|name| fields::slot(name).map(drop))
 }
 
 struct Setup<'a> {
@@ -291,9 +299,9 @@ mod tests {
         assert_eq!(fixed("{ picture = [\"# \", \" #\"] }"), 100);
         assert_eq!(fixed("{ picture = [\"# \", \" #\"], x = [0, 1], y = [0, 1] }"), 50);
         assert_eq!(fixed("{ picture = [\"#\"], x = [0, 1] }"), 100);
-        // The outermost rows: 2 (20 + 10) - 4.
-        assert_eq!(fixed("{ surface = true }"), 56);
-        assert_eq!(fixed("{ surface = false }"), 144);
+        // Away from the corners, the lowest and the highest row.
+        assert_eq!(fixed("{ surface = true, x = [0.5, 1.5] }"), 20);
+        assert_eq!(fixed("{ surface = false, x = [0.5, 1.5] }"), 80);
     }
 
     #[test]
