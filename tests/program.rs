@@ -322,7 +322,7 @@ mod unix {
         unsafe { libc::kill(child.id() as i32, libc::SIGINT) };
         let done = child.wait_with_output().unwrap();
         assert_eq!(done.status.code(), Some(130));
-        assert!(String::from_utf8_lossy(&done.stderr).contains("cancelled"));
+        assert!(String::from_utf8_lossy(&done.stderr).contains("interrupted"));
         let series = Series::read(&pvd).unwrap();
         for entry in series.entries() {
             assert_eq!(io::read(series.file_of(entry)).unwrap().points.len(), 6518);

@@ -2,12 +2,13 @@
 
 use crate::error::{Error, Result};
 use crate::solver::catalogue::{CATALOGUES, Item};
-use crate::study::{exact::SOLUTIONS, lattice::LATTICES, scene::KEYS};
+use crate::study::{exact::SOLUTIONS, keys::KEYS, lattice::LATTICES};
 use std::fmt::Write;
 
 /// Lists of the program, beside those of the solver.
 static OWN: &[(&str, &str)] = &[
     ("scene", "every key of a scene file"),
+    ("demo", "the scene that comes with the program, to start from: list demo > my.toml"),
     ("exact", "exact solutions, with their parameters"),
     ("lattices", "lattices of particles"),
 ];
@@ -21,6 +22,7 @@ pub fn text(name: Option<&str>) -> Result<String> {
     Ok(match (name, catalogue) {
         (_, Some((_, list))) => table(list().iter().map(|Item { name, about }| (name.as_str(), about.as_str()))),
         (Some("scene"), _) => scene(),
+        (Some("demo"), _) => super::DEFAULT_SCENE.to_string(),
         (Some("exact"), _) => exact(),
         (Some("lattices"), _) => table(LATTICES.iter().map(|l| (l.name, l.about))),
         (None, _) => {

@@ -45,7 +45,9 @@ enum Command {
         scene: SceneArgs,
     },
     /// List what can be chosen: kernels, operators, integrators, fields, … ; without a name, all lists
-    #[command(after_help = "'list scene' shows every key of a scene file, 'list exact' every exact solution.")]
+    #[command(
+        after_help = "'list scene' shows every key of a scene file, 'list demo' a scene to start from, 'list exact' every exact solution."
+    )]
     List {
         /// Which list
         name: Option<String>,
@@ -94,8 +96,12 @@ pub fn main() -> ExitCode {
     match done {
         Ok(()) => ExitCode::SUCCESS,
         Err(error) => {
+            let message = match error {
+                Error::Cancelled => "interrupted; the snapshots listed so far are complete".to_string(),
+                _ => error.to_string(),
+            };
             // Nobody is left to be told when standard error is closed too.
-            let _ = writeln!(std::io::stderr(), "diffusph: {error}");
+            let _ = writeln!(std::io::stderr(), "diffusph: {message}");
             ExitCode::from(exit_code(&error))
         }
     }

@@ -188,7 +188,7 @@ impl fmt::Display for Report {
         }
         match &self.series {
             Some(series) => row("wrote", format!("{series} ({} snapshots)", self.snapshots)),
-            None => Ok(()),
+            None => row("wrote", "nothing: the scene has no [output]".into()),
         }
     }
 }
