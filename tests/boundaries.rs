@@ -186,7 +186,9 @@ fn a_source_callback_sees_time_temperature_and_the_hosts_numbers() {
         out.iter_mut().zip(index).zip(t).for_each(|((s, &i), t)| *s = time * f64::from(i) - t);
         0
     })));
-    (0..50).for_each(|_| drop(s.step(0.02).unwrap()));
+    for _ in 0..50 {
+        s.step(0.02).unwrap();
+    }
     // dT/dt = i t − T from T(0) = 1: T = i (t − 1) + (1 + i) e^(−t).
     for (i, t) in s.get_all("T").unwrap().into_iter().enumerate() {
         let exact = (1.0 + i as f64) * (-1.0f64).exp();

@@ -25,6 +25,9 @@ fn hot_corner(s: &mut Solver, x: &[f64]) {
     set(s, "T", &field(x, 2, |p| if p[0] + p[1] < 0.2 { 2.0 } else { 1.0 }));
 }
 
+/// In place of steps: rates of particles that move in between.
+const RATES: &[f64] = &[];
+
 const SCENES: &[Scene] = &[
     Scene { rule: "at_rest", words: "kernel=M4", set: kappa_by_place, steps: &[3.0, 3.0, 7.0] },
     Scene { rule: "same_h", words: "kernel=M6", set: nothing, steps: &[5.0] },
@@ -35,6 +38,8 @@ const SCENES: &[Scene] = &[
     Scene { rule: "quiet_rows", words: "kernel=M4 integrator=ssprk3", set: hot_corner, steps: &[2.0, 3.0] },
     Scene { rule: "one_stage", words: "kernel=M4 integrator=rkl1", set: nothing, steps: &[0.01] },
     Scene { rule: "proven_bound", words: "kernel=M4 integrator=euler", set: nothing, steps: &[0.1, 0.1] },
+    Scene { rule: "rate_only", words: "kernel=M4", set: nothing, steps: RATES },
+    Scene { rule: "used_once", words: "kernel=C2 normalise=none", set: kappa_by_place, steps: RATES },
     Scene { rule: "positive", words: "kernel=M4", set: nothing, steps: &[5.0] },
 ];
 
@@ -44,7 +49,16 @@ fn run(scene: &Scene, without: &str) -> (diffusph::plan::Plan, Vec<f64>) {
     set(&mut s, "T", &field(&x, 2, |p| (7.0 * p[0]).sin() * (9.0 * p[1]).cos() + 2.0));
     (scene.set)(&mut s, &x);
     let limit = 1e-5;
-    scene.steps.iter().for_each(|factor| drop(s.step(factor * limit).unwrap()));
+    for factor in scene.steps {
+        s.step(factor * limit).unwrap();
+    }
+    if scene.steps.is_empty() {
+        s.get_all("rate").unwrap();
+        let moved: Vec<f64> = x.iter().map(|x| x + 1e-3).collect();
+        s.set_particles(Strided::new("x", &moved, moved.len() / 2, 2, 2).unwrap()).unwrap();
+        let rate = s.get_all("rate").unwrap();
+        return (s.plan().unwrap(), rate);
+    }
     (s.plan().unwrap(), s.get_all("T").unwrap())
 }
 

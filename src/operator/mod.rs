@@ -18,5 +18,5 @@ pub mod spectrum;
 pub mod table;
 
 pub use mean::Mean;
-pub use once::{Assembly, Matrix};
+pub use once::{Assembly, Matrix, Pairs};
 pub use table::Operator;

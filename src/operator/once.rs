@@ -72,6 +72,37 @@ impl Assembly<'_> {
         Ok((Matrix { n, blocks }, moments))
     }
 
+    /// As [`Matrix::apply`], with weights that are made for this one application and not kept: the same bits.
+    ///
+    /// # Errors
+    /// `NoMemory` for a row that does not fit.
+    pub fn apply(
+        &self,
+        pool: &Pool,
+        kappa: Option<(Mean, &[f64])>,
+        t: &[f64],
+        out: &mut [f64],
+        finish: impl Fn(usize, f64) -> f64 + Sync + Send,
+    ) -> Result<()> {
+        self.rows.map(pool, out, |(buffers, coef): &mut (Buffers, Vec<f64>), row: Row| {
+            let w = self.weights(&row, buffers)?;
+            coef.clear();
+            coef.extend(self.coefficients(&row, w));
+            let own = t[row.i];
+            let sum = match kappa {
+                None => row_sum(row.j, coef, t, own, |_, c| c),
+                Some((mean, k)) => row_sum(row.j, coef, t, own, |j, c| c * mean.of(k[row.i], k[j])),
+            };
+            Ok(finish(row.i, sum))
+        })
+    }
+
+    /// g_ab = V_a V_b w_ab of a row.
+    fn coefficients<'b>(&'b self, row: &'b Row, w: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
+        let own = self.volume[row.i];
+        row.j.iter().zip(w).map(move |(&j, w)| (own * self.volume[j as usize]) * w)
+    }
+
     fn block(&self, space: &mut Workspace, b: usize) -> Result<(Block, Vec<f64>)> {
         let range = b * BLOCK..((b + 1) * BLOCK).min(self.volume.len());
         let Workspace { scratch, buffers, col, coef } = space;
@@ -88,14 +119,10 @@ impl Assembly<'_> {
                 Ok(_) => return failed = Err(memory::no_memory::<(u32, f64)>("matrix", row.len())),
                 Err(e) => return failed = Err(e),
             };
-            let own = self.volume[row.i];
-            let mut k = 0.0;
+            let second = row.j.iter().zip(w).zip(row.r);
+            let k: f64 = second.map(|((&j, w), r)| self.volume[j as usize] * (r * r) * w).sum();
             col.extend_from_slice(row.j);
-            coef.extend(row.j.iter().zip(w).zip(row.r).map(|((&j, w), r)| {
-                let v = self.volume[j as usize];
-                k += v * (r * r) * w;
-                (own * v) * w
-            }));
+            coef.extend(self.coefficients(&row, w));
             moments.push(k / (2.0 * dim));
             start.push(col.len() as u32);
         })?;
@@ -150,6 +177,13 @@ impl Buffers {
         }
         Ok(())
     }
+}
+
+/// Pair sums, from stored weights or from weights made on the way.
+#[derive(Clone, Copy)]
+pub enum Pairs<'a> {
+    Stored(&'a Matrix),
+    Fresh(&'a Assembly<'a>),
 }
 
 /// Symmetric coefficients g_ab = V_a V_b w_ab (and what was folded into them), in rows, in blocks of [`BLOCK`] rows.

@@ -87,6 +87,23 @@ impl Plan {
         if self.leaves_out("frozen") && !self.leaves_out("uniform_kappa") {
             add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", choices.mean.name()));
         }
+        if self.leaves_out("rate_only") {
+            add("rate", When::EachStep, 0.0, pairs, "du/dt for a host that integrates itself".into());
+        } else {
+            self.list_motion(facts, setup, &mut add);
+        }
+        if !self.leaves_out("no_wall") {
+            add("surface", When::EachStage, 48.0 * facts.exchanging as f64, 0.0, "exchange with the outside".into());
+        }
+        if !self.leaves_out("no_source") {
+            add("source", When::EachStage, 8.0 * n, 0.0, "heat released in the volume".into());
+        }
+        list
+    }
+
+    /// The passes that move T.
+    fn list_motion(&self, facts: &Facts, setup: When, add: &mut impl FnMut(&'static str, When, f64, f64, String)) {
+        let (n, pairs) = (facts.n as f64, facts.n as f64 * facts.neighbours);
         let bound_when = if facts.kappa_of_t { When::EachStep } else { setup };
         add("bound", bound_when, 0.0, pairs, "Gershgorin's circles; power iteration where it saves stages".into());
         if facts.kappa_of_t {
@@ -99,12 +116,6 @@ impl Plan {
             pairs,
             format!("{}: rows of weights", facts.integrator),
         );
-        if !self.leaves_out("no_wall") {
-            add("surface", When::EachStage, 48.0 * facts.exchanging as f64, 0.0, "exchange with the outside".into());
-        }
-        if !self.leaves_out("no_source") {
-            add("source", When::EachStage, 8.0 * n, 0.0, "heat released in the volume".into());
-        }
         let mut promises = vec!["finite"];
         if facts.keeps_bounds {
             promises.push("within the bounds of before");
@@ -114,7 +125,6 @@ impl Plan {
         }
         add("check", When::EachStep, 0.0, 0.0, promises.join(", "));
         add("commit", When::EachStep, 0.0, 0.0, "the new state replaces the old".into());
-        list
     }
 }
 

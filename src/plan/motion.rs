@@ -101,7 +101,7 @@ impl Motion<'_> {
     }
 
     /// Bounds that are good enough for a step of `dt`.
-    fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
+    pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
         if let Some(bounds) = self.known.filter(|_| self.is_linear()) {
             return Ok(bounds);
         }
@@ -148,7 +148,7 @@ impl Motion<'_> {
         let mut applications = 0;
         let spectral = spectrum::largest(pool, &weight, proven.spectral, |x, y| {
             applications += 1;
-            heat.diffuse(x, y);
+            heat.diffuse(x, y)?;
             pool.chunks(&mut y[..slopes.len()], BLOCK, |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, y)| *y -= slopes[start + k] * x[start + k]);
             });

@@ -82,6 +82,18 @@ pub static RULES: &[Rule] = &[
         holds: |_| true,
     },
     Rule {
+        name: "rate_only",
+        reason: "only rates are asked for: no bound on the operator, no stages, no check",
+        same: Same::Bits,
+        holds: |f| f.rate_only,
+    },
+    Rule {
+        name: "used_once",
+        reason: "weights that serve one rate of moving particles are applied as they are made, and not stored",
+        same: Same::Bits,
+        holds: |f| f.rate_only && f.moves && !f.normalised,
+    },
+    Rule {
         name: "positive",
         reason: "no pair weight is negative, so T cannot grow: no check of its norm",
         same: Same::Bits,

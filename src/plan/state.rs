@@ -99,8 +99,9 @@ pub struct State {
     pub surface: Option<Surface>,
     pub bounds: Option<Bounds>,
 
-    /// Steps taken, and whether particles or kappa changed after the first.
+    /// Steps taken and rates asked for, and whether particles or kappa changed after the first.
     pub steps: u64,
+    pub rates: u64,
     pub moves: bool,
     pub kappa_changes: bool,
     pub timers: Timers,
@@ -128,6 +129,7 @@ impl State {
             surface: None,
             bounds: None,
             steps: 0,
+            rates: 0,
             moves: false,
             kappa_changes: false,
             timers: Timers::default(),
@@ -256,7 +258,7 @@ impl State {
 
     /// Positions, masses, densities or smoothing lengths changed.
     pub fn drop_geometry(&mut self) {
-        self.moves |= self.steps > 0;
+        self.moves |= self.steps + self.rates > 0;
         self.forget_geometry();
     }
 
@@ -268,7 +270,7 @@ impl State {
 
     /// The conductivity changed.
     pub fn drop_kappa(&mut self) {
-        self.kappa_changes |= self.steps > 0;
+        self.kappa_changes |= self.steps + self.rates > 0;
         self.bounds = None;
         if self.weights.as_ref().is_some_and(|w| w.folded) {
             self.weights = None;
@@ -338,6 +340,8 @@ impl State {
             kappa_changes: self.kappa_changes,
             exchanging,
             heated,
+            rate_only: self.rates > 0 && self.steps == 0,
+            normalised: choices.normalise,
             positive: choices.operator.positive,
             keeps_bounds: choices.operator.positive && strong_stability && !heated && exchanging == 0,
             operator: choices.operator.name,

@@ -246,8 +246,8 @@ impl Scratch {
         let n = self.j.len();
         let (r2, hits) = (&mut self.r2[..n], &mut self.hits[..n]);
         r2.fill(0.0);
-        for a in 0..D {
-            let (x, centre) = (&self.x[a][..n], centre[a]);
+        for (a, centre) in centre.iter().enumerate() {
+            let x = &self.x[a][..n];
             if SHIFTED {
                 for ((r2, x), shift) in r2.iter_mut().zip(x).zip(&self.shift[a][..n]) {
                     let d = (x - centre) + shift;
