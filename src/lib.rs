@@ -38,5 +38,8 @@ pub mod io;
 
 pub mod study;
 
+#[cfg(feature = "cli")]
+pub mod cli;
+
 pub use array::{Strided, StridedMut};
 pub use solver::Solver;

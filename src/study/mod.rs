@@ -4,12 +4,19 @@
 //! |---|---|
 //! | `exact` | exact solutions, by name |
 //! | `lattice` | particles on lattices |
-//! | `scene` | the scene file: every key, what it means, what is wrong with it |
+//! | `surface` | particles at a free surface |
+//! | `keys` | every key of a scene file, what it means, what is wrong with it |
+//! | `scene` | the scene file |
 //! | `setup` | from a scene to a solver |
+//! | `choose` | the particles that a mark is for |
 //! | `run` | the run and its snapshots |
 //! | `report` | accuracy against run time |
 
+#[cfg(feature = "cli")]
+mod choose;
 pub mod exact;
+#[cfg(feature = "cli")]
+pub mod keys;
 pub mod lattice;
 #[cfg(feature = "cli")]
 pub mod report;
@@ -19,3 +26,4 @@ pub mod run;
 pub mod scene;
 #[cfg(feature = "cli")]
 mod setup;
+pub mod surface;

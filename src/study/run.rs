@@ -49,48 +49,25 @@ impl Study {
     /// # Errors
     /// As [`Solver::step`]; `Io`; `Cancelled` when `watch` says so. Snapshots written until then are complete.
     pub fn run(mut self, out: &Path, watch: Watch) -> Result<Report> {
-        let (scene, solver) = (&self.scene, &mut self.solver);
-        let time = scene.time.clone();
-        solver.set_progress_callback(Some(told(time.start, time.end, watch)));
-        let mut writer = scene.output.as_ref().map(|output| Writer::new(output, out)).transpose()?;
-        let mut before = Temperature { min: 0.0, max: 0.0 };
-        let isolated = is_isolated(solver)?;
-        let mut work = Work::default();
-        let mut energy = 0.0;
-        let mut solving = 0.0;
-        (before.min, before.max) = (solver.get_number("T_min")?, solver.get_number("T_max")?);
-        if let Some(writer) = &mut writer {
-            writer.write(solver, 0, time.steps)?;
-        }
-        for step in 1..=time.steps {
-            let now = solver.get_number("time")?;
-            // From the ends rather than by adding up, so that the last step arrives at the end.
-            let next = time.start + (time.end - time.start) * f64::from(step) / f64::from(time.steps);
-            let report = solver.step(next - now)?;
-            if step == 1 {
-                energy = report.energy_before;
-            }
-            work.add(&report);
-            solving += report.seconds;
-            if let Some(writer) = &mut writer {
-                writer.write(solver, step, time.steps)?;
-            }
-        }
-        let after = Temperature { min: solver.get_number("T_min")?, max: solver.get_number("T_max")? };
-        let size = absolute_energy(solver)?;
-        let energy_after = solver.get_number("energy")?;
-        let relative = if size > 0.0 { (energy_after - energy) / size } else { 0.0 };
-        let (passes, _) = solver.spent();
+        let callback = told(self.scene.time.start, self.scene.time.end, watch);
+        self.solver.set_progress_callback(Some(callback));
+        let isolated = is_isolated(&mut self.solver)?;
+        let (energy, temperature) = (self.solver.get_number("energy")?, extrema(&mut self.solver)?);
+        let mut writer = self.scene.output.as_ref().map(|output| Writer::new(output, out)).transpose()?;
+        let work = self.steps(writer.as_mut())?;
+
+        let solver = &mut self.solver;
+        let accuracy = self.exact.as_ref().map(|exact| accuracy(&self.scene, solver, exact)).transpose()?;
+        let (n, neighbours) = (solver.len() as f64, solver.get_number("mean_neighbours")?);
         let seconds = Seconds {
             setup: self.setup_seconds,
-            solve: solving,
+            solve: work.seconds,
             files: writer.as_ref().map_or(0.0, |w| w.seconds),
-            passes: passes.into_iter().map(|(name, s)| (name.to_string(), s)).collect(),
+            passes: solver.spent().0.into_iter().map(|(name, s)| (name.to_string(), s)).collect(),
         };
-        let rules = solver.plan()?.left_out;
-        let neighbours = solver.get_number("mean_neighbours")?;
+        let left_out = solver.plan()?.left_out.into_iter();
         Ok(Report {
-            title: scene.title.clone(),
+            title: self.scene.title,
             words: solver.words().to_string(),
             particles: solver.len(),
             dim: solver.dim(),
@@ -98,25 +75,38 @@ impl Study {
             threads: solver.get_number("threads")? as usize,
             bytes: solver.get_number("bytes")?,
             time: solver.get_number("time")?,
-            accuracy: self.exact.as_ref().map(|exact| accuracy(scene, solver, exact)).transpose()?,
-            energy: Energy { before: energy, after: energy_after, relative, isolated },
-            temperature_before: before,
-            temperature: after,
-            ns_per_particle: seconds.per_application(&work, solver.len() as f64),
-            ns_per_pair: seconds.per_application(&work, solver.len() as f64 * neighbours),
+            accuracy,
+            energy: Energy::new(energy, solver.get_number("energy")?, absolute_energy(solver)?, isolated),
+            temperature_before: temperature,
+            temperature: extrema(solver)?,
+            ns_per_particle: seconds.per_application(&work, n),
+            ns_per_pair: seconds.per_application(&work, n * neighbours),
             work,
             seconds,
-            left_out: rules
-                .iter()
-                .map(|r| LeftOut {
-                    rule: r.name,
-                    reason: r.reason,
-                    same_bits: r.same == crate::plan::rules::Same::Bits,
-                })
+            left_out: left_out
+                .map(|r| LeftOut { rule: r.name, reason: r.reason, result: r.same.to_string() })
                 .collect(),
             series: writer.as_ref().map(|w| w.pvd.display().to_string()),
             snapshots: writer.map_or(0, |w| w.count),
         })
+    }
+
+    fn steps(&mut self, mut writer: Option<&mut Writer>) -> Result<Work> {
+        let (solver, time) = (&mut self.solver, &self.scene.time);
+        let mut work = Work::default();
+        let mut write = |solver: &mut Solver, step| match &mut writer {
+            Some(writer) => writer.write(solver, step, time.steps),
+            None => Ok(()),
+        };
+        write(solver, 0)?;
+        for step in 1..=time.steps {
+            // From the ends rather than by adding up, so that the last step arrives at the end.
+            let next = time.start + (time.end - time.start) * f64::from(step) / f64::from(time.steps);
+            let now = solver.get_number("time")?;
+            work.add(&solver.step(next - now)?);
+            write(solver, step)?;
+        }
+        Ok(work)
     }
 }
 
@@ -140,22 +130,18 @@ fn absolute_energy(solver: &mut Solver) -> Result<f64> {
     Ok(m.iter().zip(u).map(|(m, u)| (m * u).abs()).sum())
 }
 
+fn extrema(solver: &mut Solver) -> Result<Temperature> {
+    Ok(Temperature { min: solver.get_number("T_min")?, max: solver.get_number("T_max")? })
+}
+
 /// The error of T where T is not fixed.
 fn accuracy(scene: &Scene, solver: &mut Solver, exact: &Exact) -> Result<Accuracy> {
     let (dim, time) = (solver.dim(), solver.get_number("time")?);
     let known = at_all(exact, &solver.get_all("x")?, dim, time);
     let (t, fixed) = (solver.get_all("T")?, solver.get_all("fixed")?);
-    let free =
-        || t.iter().zip(&known).zip(&fixed).filter(|(_, fixed)| **fixed == 0.0).map(|((t, known), _)| (t, known));
-    let sum = |term: fn(f64, f64) -> f64| free().map(|(t, known)| term(*t, *known)).sum::<f64>();
-    let most = |term: fn(f64, f64) -> f64| free().map(|(t, known)| term(*t, *known)).fold(0.0, f64::max);
-    let ratio = |error: f64, size: f64| if size > 0.0 { error / size } else { error };
-    Ok(Accuracy {
-        solution: scene.exact.as_ref().map_or(String::new(), |e| e.name.clone()),
-        l2: ratio(sum(|t, known| (t - known).powi(2)), sum(|_, known| known * known)).sqrt(),
-        max: ratio(most(|t, known| (t - known).abs()), most(|_, known| known.abs())),
-        particles: free().count(),
-    })
+    let free = t.iter().zip(&known).zip(&fixed).filter(|(_, fixed)| **fixed == 0.0).map(|((t, known), _)| (*t, *known));
+    let solution = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
+    Ok(Accuracy::new(solution, &free.collect::<Vec<_>>()))
 }
 
 /// Writes the series.

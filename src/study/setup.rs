@@ -1,22 +1,22 @@
 //! From a scene to a solver: particles, quantities, marks.
 
 use super::exact::{self, Exact};
-use super::lattice;
 use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
+use super::{choose, lattice, surface};
 use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::io::{self, Snapshot};
 use crate::model::conductivity::LAWS;
+use crate::model::fields::{self, NUMBERS};
 use crate::solver::Solver;
+use crate::space::Domain;
 use std::collections::BTreeMap;
 use std::path::Path;
-
-/// A free surface is where h Σ V w r, 0 inside, is longer than this.
-const SURFACE: f64 = 0.5;
 
 pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
     let solver = Solver::new(&scene.words)?;
     let mut setup = Setup { scene, snapshot: None, exact: None, x: Vec::new(), cell: None, solver };
+    known(scene.set.keys().chain(scene.mark.iter().flat_map(|mark| mark.set.keys())))?;
     setup.space()?;
     setup.particles(folder)?;
     setup.exact = setup.find_exact()?;
@@ -33,6 +33,12 @@ pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
     Ok((setup.solver, setup.exact))
 }
 
+/// Every name is that of a quantity that can be set.
+fn known<'a>(names: impl Iterator<Item = &'a String>) -> Result<()> {
+    let mut others = names.filter(|name| !NUMBERS.iter().any(|n| n.name == name.as_str()));
+    others.try_for_each(|name| fields::slot(name).map(drop))
+}
+
 struct Setup<'a> {
     scene: &'a Scene,
     snapshot: Option<Snapshot>,
@@ -46,12 +52,30 @@ struct Setup<'a> {
 
 impl Setup<'_> {
     fn space(&mut self) -> Result<()> {
-        let Some(space) = &self.scene.space else { return Ok(()) };
-        let periodic = match &space.periodic {
-            Periodic::All(all) => vec![*all; self.solver.dim()],
-            Periodic::Each(each) => each.clone(),
-        };
-        self.solver.set_box(&space.lo, &space.hi, &periodic)
+        match &self.scene.space {
+            Some(space) => self.solver.set_box(&space.lo, &space.hi, &self.periodic()),
+            None => Ok(()),
+        }
+    }
+
+    fn periodic(&self) -> Vec<bool> {
+        match self.scene.space.as_ref().map(|s| &s.periodic) {
+            Some(Periodic::Each(each)) => each.clone(),
+            Some(Periodic::All(all)) => vec![*all; self.solver.dim()],
+            None => vec![false; self.solver.dim()],
+        }
+    }
+
+    fn domain(&self) -> Result<Domain> {
+        let open = || Ok(Domain::open(self.solver.dim()));
+        self.scene.space.as_ref().map_or_else(open, |s| Domain::new(&s.lo, &s.hi, &self.periodic()))
+    }
+
+    /// (m/rho)^(1/nu)
+    fn spacing(&mut self) -> Result<Vec<f64>> {
+        let power = 1.0 / self.solver.dim() as f64;
+        let (m, rho) = (self.solver.get_all("m")?, self.solver.get_all("rho")?);
+        Ok(m.iter().zip(rho).map(|(m, rho)| (m / rho).powf(power)).collect())
     }
 
     fn particles(&mut self, folder: &Path) -> Result<()> {
@@ -164,28 +188,10 @@ impl Setup<'_> {
     }
 
     fn chosen(&mut self, place: &Where) -> Result<Vec<bool>> {
-        let dim = self.solver.dim();
-        let mut chosen = vec![true; self.solver.len()];
+        let mut chosen = choose::by_place(place, self.scene.space.as_ref(), &self.x, self.solver.dim())?;
         let mut keep = |holds: &dyn Fn(usize) -> bool| {
             chosen.iter_mut().enumerate().for_each(|(i, chosen)| *chosen &= holds(i));
         };
-        let inside = |range: [f64; 2], v: f64| v >= range[0] && v <= range[1];
-        for (axis, range) in [place.x, place.y, place.z].into_iter().enumerate() {
-            match range {
-                Some(range) if axis < dim => keep(&|i| inside(range, self.x[i * dim + axis])),
-                Some(_) => return Err(Error::bad("where", ["x", "y", "z"][axis], &format!("the scene has dim={dim}"))),
-                None => {}
-            }
-        }
-        if let Some(range) = place.r {
-            let centre = |axis: usize| place.centre.get(axis).copied().unwrap_or(0.0);
-            let r2 = |i: usize| (0..dim).map(|a| (self.x[i * dim + a] - centre(a)).powi(2)).sum::<f64>();
-            keep(&|i| inside(range, r2(i).sqrt()));
-        }
-        if let Some(picture) = &place.picture {
-            let frame = self.frame(place)?;
-            keep(&|i| painted(picture, frame, self.x[i * dim], self.x[i * dim + 1]));
-        }
         match (&place.field, place.equals) {
             (Some(field), Some(value)) => {
                 let values = self.array("where", field)?;
@@ -195,32 +201,12 @@ impl Setup<'_> {
             _ => return Err(Error::bad("where", "incomplete", "field and equals go together")),
         }
         if let Some(wanted) = place.surface {
-            let moments = self.solver.get_all("first_moment")?;
-            keep(&|i| (moments[i * dim..(i + 1) * dim].iter().map(|m| m * m).sum::<f64>().sqrt() > SURFACE) == wanted);
+            let spacing = self.spacing()?;
+            let free = surface::free(&self.domain()?, &self.x, &spacing)?;
+            keep(&|i| free[i] == wanted);
         }
         Ok(chosen)
     }
-
-    /// The rectangle that a picture is stretched over: [x, y] of the condition, or else the box.
-    fn frame(&self, place: &Where) -> Result<[[f64; 2]; 2]> {
-        let bounds = |axis: usize| self.scene.space.as_ref().and_then(|s| Some([*s.lo.get(axis)?, *s.hi.get(axis)?]));
-        match (place.x.or(bounds(0)), place.y.or(bounds(1))) {
-            (Some(x), Some(y)) if self.solver.dim() >= 2 => Ok([x, y]),
-            _ => Err(Error::bad("picture", "without a frame", "it needs dim=2 or 3, and x and y or a [box]")),
-        }
-    }
-}
-
-/// Whether (x, y) lies under a letter of the picture; its first line is at the top.
-fn painted(picture: &[String], [across, up]: [[f64; 2]; 2], x: f64, y: f64) -> bool {
-    let width = picture.iter().map(|line| line.chars().count()).max().unwrap_or(0);
-    let share = |v: f64, [from, to]: [f64; 2]| (v - from) / (to - from);
-    let (column, row) = (share(x, across) * width as f64, (1.0 - share(y, up)) * picture.len() as f64);
-    if column < 0.0 || row < 0.0 {
-        return false;
-    }
-    let letter = picture.get(row as usize).and_then(|line| line.chars().nth(column as usize));
-    letter.is_some_and(|c| !c.is_whitespace())
 }
 
 /// An exact solution at every particle.
@@ -270,13 +256,9 @@ mod tests {
         assert_eq!(fixed("{}"), 200);
         assert_eq!(fixed("{ x = [0, 0.5], y = [0.5, 1] }"), 25);
         assert_eq!(fixed("{ r = [0, 0.11], centre = [1, 0.5] }"), 4);
-        // Two letters wide, two high: the left half of the upper row, the right half of the lower.
-        assert_eq!(fixed("{ picture = [\"# \", \" #\"] }"), 100);
-        assert_eq!(fixed("{ picture = [\"# \", \" #\"], x = [0, 1], y = [0, 1] }"), 50);
-        assert_eq!(fixed("{ picture = [\"#\"], x = [0, 1] }"), 100);
-        // The outermost rows: 2 (20 + 10) - 4.
-        assert_eq!(fixed("{ surface = true }"), 56);
-        assert_eq!(fixed("{ surface = false }"), 144);
+        // Away from the corners, the lowest and the highest row.
+        assert_eq!(fixed("{ surface = true, x = [0.5, 1.5] }"), 20);
+        assert_eq!(fixed("{ surface = false, x = [0.5, 1.5] }"), 80);
     }
 
     #[test]

@@ -25,7 +25,8 @@ impl Layers {
     }
 }
 
-/// Between two concentric circles (2-D: T is linear in log r) or spheres (3-D: in 1/r) of fixed temperature.
+/// Between two concentric circles (2-D: T is linear in log r) or spheres (3-D: in 1/r) of fixed temperature; continued
+/// to half the inner and twice the outer radius, for the particles that hold the temperatures.
 #[derive(Debug, Clone, Copy)]
 pub struct Shell {
     pub radius: [f64; 2],
@@ -37,7 +38,7 @@ pub struct Shell {
 impl Shell {
     pub fn at(&self, x: [f64; 3]) -> f64 {
         let r = (0..self.dim).map(|a| (x[a] - self.centre[a]).powi(2)).sum::<f64>().sqrt();
-        let r = r.clamp(self.radius[0], self.radius[1]);
+        let r = r.clamp(0.5 * self.radius[0], 2.0 * self.radius[1]);
         let potential = |r: f64| match self.dim {
             1 => r,
             2 => r.ln(),
