@@ -285,9 +285,10 @@ fn is_quiet(levels: &[Option<f64>], block: usize, touches: &[u32]) -> bool {
     levels[block].is_some_and(|own| touches.iter().all(|&b| levels[b as usize] == Some(own)))
 }
 
-/// Σ g(b, c) (T_b − T_a) over a row, b = index(column) always being a particle of `t`. Four running sums: one would wait for its own last addition at every neighbour.
+/// Σ g(b, c) (T_b − T_a) over a row, b = index(column) always being a particle of `t`. Four running sums: one would wait
+/// for its own last addition at every neighbour.
 #[inline(always)]
-pub fn row_sum<C: Copy>(
+pub(super) fn row_sum<C: Copy>(
     col: &[C],
     coef: &[f64],
     t: &[f64],
