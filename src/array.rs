@@ -123,7 +123,7 @@ mod tests {
         let x = Strided::new("x", &xyzh, 3, 4, 3).unwrap();
         let h = Strided::new("h", &xyzh[3..], 3, 4, 1).unwrap();
         assert_eq!((x.at(2, 1), h.at(0, 0), h.at(2, 0)), (9.0, 3.0, 11.0));
-        let mut out = vec![-1.0; 12];
+        let mut out = [-1.0; 12];
         let mut view = StridedMut::new("h", &mut out[3..], 3, 4, 1).unwrap();
         view.set(1, 0, 5.0);
         assert_eq!(out.iter().filter(|&&v| v != -1.0).count(), 1);

@@ -36,6 +36,11 @@ pub mod solver;
 
 pub mod io;
 
+pub mod study;
+
+#[cfg(feature = "cli")]
+pub mod cli;
+
 pub mod ffi;
 
 pub use array::{Strided, StridedMut};

@@ -1,1 +1,5 @@
-fn main() {}
+//! The program `diffusph`.
+
+fn main() -> std::process::ExitCode {
+    diffusph::cli::main()
+}

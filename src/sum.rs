@@ -31,6 +31,24 @@ pub fn min(pool: &Pool, n: usize, term: impl Fn(usize) -> f64 + Sync + Send) -> 
     -max(pool, n, |i| -term(i))
 }
 
+/// The weighted root mean square of `value` − its weighted mean, scaled so that squares neither over- nor underflow;
+/// infinite or NaN where a value is.
+pub fn spread(
+    pool: &Pool,
+    n: usize,
+    weight: impl Fn(usize) -> f64 + Sync + Send,
+    value: impl Fn(usize) -> f64 + Sync + Send,
+) -> f64 {
+    let largest = max(pool, n, |i| value(i).abs());
+    if !largest.is_finite() || largest == 0.0 {
+        return largest.max(0.0);
+    }
+    let total = sum(pool, n, &weight);
+    let mean = sum(pool, n, |i| weight(i) / total * (value(i) / largest));
+    let deviation = |i: usize| value(i) / largest - mean;
+    largest * sum(pool, n, |i| weight(i) / total * deviation(i) * deviation(i)).sqrt()
+}
+
 /// The first index for which `test` holds.
 pub fn first(pool: &Pool, n: usize, test: impl Fn(usize) -> bool + Sync + Send) -> Option<usize> {
     blocks(pool, n, |mut range| range.find(|&i| test(i))).into_iter().flatten().next()
@@ -56,6 +74,18 @@ mod tests {
     #[test]
     fn cancellation_is_compensated() {
         assert_eq!(compensated([1.0, 1e100, 1.0, -1e100]), 2.0);
+    }
+
+    #[test]
+    fn spread_is_scale_free_and_passes_infinity_on() {
+        let pool = Pool::new(1).unwrap();
+        for scale in [1.0, 1e-200, 1e200] {
+            // Values 1 and 3 with weights 3 and 1: mean 1.5, variance (3·0.25 + 2.25)/4 = 0.75.
+            let spread = spread(&pool, 2, |i| [3.0, 1.0][i], |i| scale * [1.0, 3.0][i]);
+            assert!((spread / scale - 0.75f64.sqrt()).abs() < 1e-15);
+        }
+        assert_eq!(spread(&pool, 2, |_| 1.0, |i| [0.0, f64::INFINITY][i]), f64::INFINITY);
+        assert_eq!(spread(&pool, 2, |_| 1.0, |_| 0.0), 0.0);
     }
 
     #[test]

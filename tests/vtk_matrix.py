@@ -9,6 +9,7 @@ The arrays of `case.ending` lie in `case.ending.arrays/`: one file of little-end
 
 import itertools
 import os
+import shutil
 import sys
 
 import meshio
@@ -202,6 +203,37 @@ def write_legacy(folder):
         expect(path, points, fields)
 
 
+def write_structured(folder):
+    points, fields = cloud(1000)
+    grid = vtk.vtkStructuredGrid()
+    grid.SetDimensions(10, 10, 10)
+    positions = vtk.vtkPoints()
+    positions.SetData(vtk_array("Points", points))
+    grid.SetPoints(positions)
+    for name, array in fields.items():
+        grid.GetPointData().AddArray(vtk_array(name, array))
+    for name in ["structured_plain.vts", "refused_zlib.vts"]:
+        writer = vtk.vtkXMLStructuredGridWriter()
+        writer.SetFileName(f"{folder}/{name}")
+        writer.SetInputData(grid)
+        writer.SetDataModeToBinary()
+        writer.SetHeaderTypeToUInt32()
+        if "plain" in name:
+            writer.SetCompressorTypeToNone()
+        assert writer.Write() == 1
+        expect(f"{folder}/{name}", points, fields)
+
+
+def copy_data(folder):
+    """The particles that this repository keeps, as meshio reads them."""
+    data = os.path.join(os.path.dirname(os.path.abspath(__file__)), "data")
+    for name in ["dam_break.vtu", "glass_24.vtu"]:
+        path = f"{folder}/meshio_{name}"
+        shutil.copy(os.path.join(data, name), path)
+        mesh = meshio.read(path)
+        expect(path, mesh.points, mesh.point_data)
+
+
 def read_expected(path):
     folder = path + ".arrays"
     arrays = []
@@ -216,6 +248,7 @@ def read_expected(path):
 def same(path, who, got, wanted):
     assert got.shape == wanted.shape, f"{who} {path}: {got.shape} instead of {wanted.shape}"
     assert got.dtype.itemsize == wanted.dtype.itemsize and got.dtype.kind == wanted.dtype.kind, f"{who} {path} {got.dtype}"
+    got = got.astype(got.dtype.newbyteorder("<"))  # of the same numbers: no bit of them changes
     assert np.ascontiguousarray(got).tobytes() == wanted.tobytes(), f"{who} {path}: other bits"
 
 
@@ -232,8 +265,8 @@ def read_with_vtk(path, wanted):
     data = reader.GetOutput()
     n = len(wanted[0][1])
     assert not failures, failures
-    assert data.GetNumberOfPoints() == n and data.GetNumberOfCells() == n, path
-    assert all(data.GetCellType(i) == vtk.VTK_VERTEX for i in range(n))
+    assert data.GetNumberOfPoints() == n and sum(data.GetCell(i).GetNumberOfPoints() for i in range(data.GetNumberOfCells())) == n
+    assert all(data.GetCellType(i) == vtk.VTK_VERTEX for i in range(n)), path
     assert all(data.GetCell(i).GetPointId(0) == i for i in range(min(n, 1000)))
     if n:
         same(path, "vtk", vtk_to_numpy(data.GetPoints().GetData()), wanted[0][1])
@@ -267,7 +300,7 @@ def read(folder):
         if name.endswith((".vtu", ".vtk")):
             wanted = read_expected(path)
             read_with_vtk(path, wanted)
-            if not (name.endswith(".vtk") and len(wanted[0][1]) == 0):
+            if name.endswith(".vtu") or len(wanted[0][1]):
                 read_with_meshio(path, wanted)
             if name.endswith(".vtu") and len(wanted[0][1]):
                 same(path, "pyvista", np.asarray(pyvista.read(path).points), wanted[0][1])
@@ -284,5 +317,7 @@ if __name__ == "__main__":
         write_defaults(folder)
         write_pieces(folder)
         write_legacy(folder)
+        write_structured(folder)
+        copy_data(folder)
     else:
         read(folder)

@@ -181,6 +181,11 @@ impl Method {
         self.interval(fewest) / bounds.spectral
     }
 
+    /// Whether the number of stages follows from the step.
+    pub fn is_stabilised(&self) -> bool {
+        matches!(self.family, Family::Stabilised(_))
+    }
+
     /// z such that the method is stable for real eigenvalues in [-z / dt, 0].
     pub fn interval(&self, stages: u32) -> f64 {
         match self.family {

@@ -11,7 +11,7 @@ use std::sync::atomic::{AtomicU64, Ordering};
 pub fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
     replace_or_fail(path, fill).map_err(|e| Error::Io {
         path: path.display().to_string(),
-        reason: format!("cannot write it ({e}); nothing was changed"),
+        reason: format!("cannot write it: {e}; free some space or choose another place"),
     })
 }
 

@@ -3,7 +3,9 @@
 //! vtkio can panic on a damaged file, so each call is guarded; it passes over what it cannot parse, so whatever it leaves
 //! unread is an error here; and it writes into memory, since it does not notice a full disk.
 
-use super::snapshot::{Data, Field, Snapshot, Values, View};
+use super::data::Data;
+use super::snapshot::{Field, Snapshot};
+use super::view::{Values, View};
 use super::{broken, system};
 use crate::error::{Error, Result};
 use crate::memory;
@@ -69,22 +71,22 @@ fn decode(bytes: &[u8]) -> Result<Snapshot> {
     Ok(snapshot)
 }
 
-/// VTK and meshio call integers `vtktypeint32` now; vtkio knows that name only in lists of cells, which have no number
-/// before it.
+/// VTK and meshio name integers by their size now; vtkio knows that only in lists of cells, which have no number before
+/// it.
 fn older_types(bytes: &[u8]) -> Cow<'_, [u8]> {
-    const NEW: &[u8] = b" vtktypeint";
+    const NEW: &[u8] = b" vtktype";
     let mut out = Vec::new();
     let mut done = 0;
-    for i in 1..bytes.len().saturating_sub(NEW.len() + 3) {
-        let old = match &bytes[i..] {
-            b if b[0] != b' ' || !b.starts_with(NEW) || !bytes[i - 1].is_ascii_digit() => continue,
-            b if b[NEW.len()..].starts_with(b"32\n") => " int",
-            b if b[NEW.len()..].starts_with(b"64\n") => " long",
-            _ => continue,
-        };
-        out.extend_from_slice(&bytes[done..i]);
+    for i in 1..bytes.len().saturating_sub(NEW.len()) {
+        if bytes[i] != b' ' || !bytes[i..].starts_with(NEW) || !bytes[i - 1].is_ascii_digit() {
+            continue;
+        }
+        let rest = &bytes[i + NEW.len()..];
+        let line = rest.split(|b| *b == b'\n').next().unwrap_or_default();
+        let Some((_, old)) = OLDER.iter().find(|(new, _)| new.as_bytes() == line.trim_ascii_end()) else { continue };
+        out.extend_from_slice(&bytes[done..=i]);
         out.extend_from_slice(old.as_bytes());
-        done = i + NEW.len() + 2;
+        done = i + NEW.len() + line.len();
     }
     if done == 0 {
         return bytes.into();
@@ -92,6 +94,16 @@ fn older_types(bytes: &[u8]) -> Cow<'_, [u8]> {
     out.extend_from_slice(&bytes[done..]);
     out.into()
 }
+
+static OLDER: &[(&str, &str)] = &[
+    ("int8", "char"),
+    ("uint8", "unsigned_char"),
+    ("int16", "short"),
+    ("int32", "int"),
+    ("uint32", "unsigned_int"),
+    ("int64", "long"),
+    ("uint64", "unsigned_long"),
+];
 
 /// The three opening lines, the DATASET line and the rest, if that begins with field data.
 fn split_field_data(bytes: &[u8]) -> Option<(&[u8], &[u8], &[u8])> {
@@ -192,11 +204,7 @@ fn grid(view: &View) -> Result<DataSet> {
 }
 
 fn buffer(values: &Values) -> Result<IOBuffer> {
-    let mut bytes = memory::reserved("an array of a legacy file", values.count * values.width)?;
-    values.blocks(|block| -> Result<()> {
-        bytes.extend_from_slice(block);
-        Ok(())
-    })?;
+    let bytes = values.bytes()?;
     let kind = match values.type_name {
         "Float64" => ScalarType::F64,
         "Float32" => ScalarType::F32,
@@ -260,8 +268,8 @@ mod tests {
 
     #[test]
     fn only_types_are_renamed_not_lists_of_cells() {
-        let text = b"OFFSETS vtktypeint64\n0 1\nid 1 1 vtktypeint64\n7\nk 1 1 vtktypeint32\n8\n";
-        let older = b"OFFSETS vtktypeint64\n0 1\nid 1 1 long\n7\nk 1 1 int\n8\n";
+        let text = b"OFFSETS vtktypeint64\n0 1\nid 1 1 vtktypeint64\n7\nk 1 1 vtktypeuint8 \n8\n";
+        let older = b"OFFSETS vtktypeint64\n0 1\nid 1 1 long\n7\nk 1 1 unsigned_char\n8\n";
         assert_eq!(&older_types(text)[..], older);
         assert!(matches!(older_types(older), Cow::Borrowed(b) if b == older));
     }

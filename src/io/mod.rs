@@ -2,8 +2,10 @@
 //!
 //! | file | what it does |
 //! |---|---|
-//! | `snapshot` | the in-memory form: owned ([`Snapshot`]) and borrowed ([`View`]) |
+//! | `snapshot`, `data` | a cloud as read: points, fields, time, notes; numbers of every type |
+//! | `view` | a cloud to write: borrowed, or computed a block at a time |
 //! | `xml_read` | `.vtu`, `.vtp` and their parallel lists, in all of VTK's encodings |
+//! | `split` | an XML file cut into its head and its appended section |
 //! | `payload` | the bytes of one array: base64, block headers, decompression |
 //! | `xml_write` | `.vtu`, streamed |
 //! | `legacy` | legacy `.vtk` both ways and grids of other kinds, through vtkio |
@@ -11,17 +13,22 @@
 //! | `atomic` | every file appears whole or not at all |
 
 pub mod atomic;
+mod data;
 mod legacy;
 mod payload;
 mod pvd;
 #[cfg(test)]
 mod samples;
 mod snapshot;
+mod split;
+mod view;
 mod xml_read;
 mod xml_write;
 
+pub use data::{Data, Element};
 pub use pvd::{Entry, Series};
-pub use snapshot::{Column, Data, Element, Field, Snapshot, Values, View};
+pub use snapshot::{Field, Snapshot};
+pub use view::{Column, Values, View};
 pub use xml_write::{Encoding, Options};
 
 use crate::error::{Error, Result};

@@ -4,9 +4,10 @@
 //! Sizes in a file are claims. Each is checked against the bytes that are there before memory is reserved for it.
 
 use super::broken;
-use super::snapshot::Element;
+use super::data::Element;
 use crate::error::{Error, Result};
 use crate::memory;
+use std::borrow::Cow;
 use std::io::{self, Read};
 
 /// How a file stores its binary arrays.
@@ -23,6 +24,13 @@ pub struct Layout {
 pub enum Compressor {
     Zlib,
     Lz4,
+}
+
+impl Layout {
+    /// The most values, in bytes, that so many bytes of a file can hold.
+    pub fn capacity(&self, bytes: u64) -> u64 {
+        bytes.saturating_mul(self.compressor.map_or(1, Compressor::best_ratio))
+    }
 }
 
 impl Compressor {
@@ -115,7 +123,7 @@ impl<'a> Payload<'a> {
         let packed_sizes = self.words(layout, blocks)?;
         let packed = packed_sizes.iter().try_fold(0u64, |sum, &s| sum.checked_add(s)).unwrap_or(u64::MAX);
         self.has(packed)?;
-        if bytes / compressor.best_ratio() > packed {
+        if bytes > layout.capacity(packed) {
             return Err(broken(format!("{packed} bytes cannot unpack to {bytes}")));
         }
         let mut values = zeroed(count)?;
@@ -204,25 +212,36 @@ struct Base64<'a> {
 /// Characters decoded at once.
 const CHARACTERS: usize = 1 << 15;
 
-impl Base64<'_> {
+impl<'a> Base64<'a> {
     fn refill(&mut self) -> io::Result<()> {
-        let mut characters = Vec::with_capacity(CHARACTERS);
-        while characters.len() < CHARACTERS && !self.text.is_empty() {
-            let (now, later) = self.text.split_at(self.text.len().min(CHARACTERS - characters.len()));
-            characters.extend(now.iter().filter(|c| !c.is_ascii_whitespace()));
-            self.text = later;
-        }
+        let (now, later) = self.text.split_at(self.text.len().min(CHARACTERS));
+        // Folded, not `any`: the loop without a way out is the one that compilers make wide.
+        let spaced = now.iter().fold(false, |found, c| found | (*c <= b' '));
+        let (characters, later) = if spaced { self.without_spaces() } else { (Cow::Borrowed(now), later) };
+        self.text = later;
         self.bytes.clear();
         self.at = 0;
         let mut rest = &characters[..];
         while !rest.is_empty() {
-            let end = rest.iter().position(|&c| c == b'=').map_or(rest.len(), |i| (i / 4 + 1) * 4);
+            let padding = if rest.contains(&b'=') { rest.iter().position(|&c| c == b'=') } else { None };
+            let end = padding.map_or(rest.len(), |i| (i / 4 + 1) * 4);
             let (segment, after) = rest.split_at_checked(end).ok_or(io::ErrorKind::UnexpectedEof)?;
             let decoded = base64_simd::STANDARD.decode_append(segment, &mut self.bytes);
             decoded.map_err(|_| io::ErrorKind::InvalidData)?;
             rest = after;
         }
         Ok(())
+    }
+
+    /// The next characters that are not white space, and the text after them.
+    fn without_spaces(&self) -> (Cow<'a, [u8]>, &'a [u8]) {
+        let (mut characters, mut rest) = (Vec::with_capacity(CHARACTERS), self.text);
+        while characters.len() < CHARACTERS && !rest.is_empty() {
+            let (now, later) = rest.split_at(rest.len().min(CHARACTERS - characters.len()));
+            characters.extend(now.iter().filter(|c| !c.is_ascii_whitespace()));
+            rest = later;
+        }
+        (characters.into(), rest)
     }
 }
 

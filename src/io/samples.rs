@@ -36,7 +36,7 @@ pub fn same(a: &Snapshot, b: &Snapshot) -> bool {
         let mut all: Vec<u8> = bytemuck::cast_slice(&s.points).to_vec();
         for f in &s.fields {
             all.extend(format!("{} {} {}", f.name, f.components, f.data.type_name()).bytes());
-            f.data.values().blocks::<()>(|block| Ok(all.extend_from_slice(block))).unwrap();
+            all.extend(f.data.values().bytes().unwrap());
         }
         all
     };

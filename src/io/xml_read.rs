@@ -1,15 +1,17 @@
 //! VTK's XML files: points and point arrays of `.vtu` and `.vtp`, in every encoding that VTK writes.
 //!
-//! The format: <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>. A raw appended section is not XML,
-//! so the file is split there: the head goes to the XML parser, the arrays are read from the file where they lie.
+//! The format: <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>.
 
+use super::data::{Data, Element, ReadValues, extend};
 use super::payload::{Compressor, Layout, Payload};
-use super::snapshot::{Data, Element, Field, ReadValues, Snapshot, extend};
+use super::snapshot::{Field, Snapshot};
+use super::split::{Appended, Split};
 use super::{broken, in_file, legacy, system};
 use crate::error::{Error, Result};
-use roxmltree::{Document, Node};
+use roxmltree::Node;
+use std::cell::Cell;
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{Seek, SeekFrom};
 use std::path::Path;
 
 /// Reads an open file; `path` is for its neighbours. The pieces of a parallel file are not `whole`: they cannot list
@@ -23,113 +25,18 @@ pub fn read(mut file: File, path: &Path, whole: bool) -> Result<Snapshot> {
     let grid = root.children().find(|c| c.has_tag_name(kind));
     let grid = grid.ok_or_else(|| broken(format!("it has no {kind} element")))?;
     match kind {
-        "UnstructuredGrid" | "PolyData" => Reader { file: &file, split: &split, layout: layout(root)? }.grid(grid),
+        "UnstructuredGrid" | "PolyData" => {
+            Reader { file: &file, split: &split, layout: layout(root)?, taken: Cell::new(0) }.grid(grid)
+        }
         "PUnstructuredGrid" | "PPolyData" if whole => parallel(grid, path),
         "PUnstructuredGrid" | "PPolyData" => Err(broken("a piece of a list is a list again")),
         "Collection" => Err(broken("it is a list of files; read one of those, or open it as a series")),
         // vtkio aborts the process on a forged compressed file, so it never sees one.
-        _ if compressor(root)?.is_some() => {
+        _ if root.attributes().any(|a| a.name() == "compressor") => {
             Err(broken(format!("a compressed {kind} is not supported; re-save it without compression")))
         }
         _ => legacy::read_xml(path),
     }
-}
-
-/// A file cut where its appended section begins.
-struct Split {
-    /// The XML up to there, with the open elements closed.
-    head: String,
-    length: u64,
-    appended: Appended,
-}
-
-enum Appended {
-    None,
-    /// Bare bytes from this place in the file on.
-    Raw(u64),
-    Base64(Vec<u8>),
-}
-
-const MARK: &[u8] = b"<AppendedData";
-
-impl Split {
-    fn of(file: &mut File) -> Result<Split> {
-        let length = file.seek(SeekFrom::End(0)).map_err(system)?;
-        file.rewind().map_err(system)?;
-        let mut head = Vec::new();
-        let Some(mark) = read_until(file, &mut head, 0, MARK)? else {
-            return Ok(Split { head: utf8(head)?, length, appended: Appended::None });
-        };
-        let missing = || broken("its appended section has no beginning");
-        let close = read_until(file, &mut head, mark, b">")?.ok_or_else(missing)?;
-        let start = read_until(file, &mut head, close, b"_")?.ok_or_else(missing)? + 1;
-        let after = head.split_off(start);
-        head.truncate(close + 1);
-        let mut head = utf8(head)?;
-        let raw = match encoding(&head[mark..]) {
-            Some("raw") => true,
-            Some("base64") | None => false,
-            Some(other) => return Err(broken(format!("appended encoding '{other}' is neither raw nor base64"))),
-        };
-        head.push_str("</AppendedData></VTKFile>");
-        let appended = if raw { Appended::Raw(start as u64) } else { Appended::Base64(text_after(file, after)?) };
-        Ok(Split { head, length, appended })
-    }
-
-    fn document(&self) -> Result<Document<'_>> {
-        Document::parse(&self.head).map_err(|e| broken(format!("its XML is wrong: {e}")))
-    }
-}
-
-/// The value of `encoding` in a start tag.
-fn encoding(tag: &str) -> Option<&str> {
-    let value = tag.split_once("encoding")?.1.trim_start().strip_prefix('=')?.trim_start();
-    let quote = value.chars().next().filter(|c| matches!(c, '"' | '\''))?;
-    value[1..].split(quote).next()
-}
-
-/// Reads on until `pattern` is found in `bytes`, not before `from`; its place, or `None` at the end of the file.
-fn read_until(file: &mut File, bytes: &mut Vec<u8>, from: usize, pattern: &[u8]) -> Result<Option<usize>> {
-    let mut from = from;
-    loop {
-        if let Some(place) = find(&bytes[from..], pattern) {
-            return Ok(Some(from + place));
-        }
-        from = from.max((bytes.len() + 1).saturating_sub(pattern.len()));
-        let step = 1 << 20;
-        bytes
-            .try_reserve(step)
-            .map_err(|_| crate::memory::no_memory::<u8>("the text of the file", bytes.len() + step))?;
-        if file.by_ref().take(step as u64).read_to_end(bytes).map_err(system)? == 0 {
-            return Ok(None);
-        }
-    }
-}
-
-fn find(bytes: &[u8], pattern: &[u8]) -> Option<usize> {
-    let mut from = 0;
-    while let Some(place) = bytes[from..].iter().position(|b| b == &pattern[0]) {
-        from += place;
-        if bytes[from..].starts_with(pattern) {
-            return Some(from);
-        }
-        from += 1;
-    }
-    None
-}
-
-/// The rest of a base64 section: up to the element's end tag.
-fn text_after(file: &mut File, mut text: Vec<u8>) -> Result<Vec<u8>> {
-    let end = match read_until(file, &mut text, 0, b"<")? {
-        Some(end) => end,
-        None => text.len(),
-    };
-    text.truncate(end);
-    Ok(text)
-}
-
-fn utf8(bytes: Vec<u8>) -> Result<String> {
-    String::from_utf8(bytes).map_err(|_| broken("it is no VTK file: its text is not UTF-8"))
 }
 
 fn layout(root: Node) -> Result<Layout> {
@@ -170,9 +77,22 @@ struct Reader<'a> {
     file: &'a File,
     split: &'a Split,
     layout: Layout,
+    /// Bytes of all arrays so far.
+    taken: Cell<u64>,
 }
 
 impl Reader<'_> {
+    /// Notes that an array of so many bytes is read. Together they cannot hold more than the file, unless it has been
+    /// forged to give the same bytes again and again.
+    fn take(&self, count: usize, size: usize) -> Result<()> {
+        let taken = (count as u64).saturating_mul(size as u64).saturating_add(self.taken.get());
+        self.taken.set(taken);
+        if taken > self.layout.capacity(self.split.length) {
+            return Err(broken("its arrays claim more than the file holds"));
+        }
+        Ok(())
+    }
+
     fn grid(&self, grid: Node) -> Result<Snapshot> {
         let pieces = grid.children().filter(|c| c.has_tag_name("Piece"));
         let mut snapshot = join(pieces.map(|piece| self.piece(piece)).collect::<Result<_>>()?)?;
@@ -233,7 +153,8 @@ impl Reader<'_> {
             Some("Int8" | "String") => self.payload(array).and_then(|p| p.text(&self.layout)),
             _ => return Ok(None),
         };
-        let bytes = bytes.map_err(|e| in_array(array, e))?;
+        let bytes: Vec<u8> = bytes.map_err(|e| in_array(array, e))?;
+        self.take(bytes.len(), 1)?;
         // VTK ends each of several strings with a NUL.
         Ok(String::from_utf8(bytes).ok().map(|text| text.trim_end_matches('\0').replace('\0', "\n")))
     }
@@ -268,7 +189,10 @@ impl ReadValues for Array<'_, '_, '_> {
     fn values<T: Element>(self) -> Result<Vec<T>> {
         match self.array.attribute("format") {
             Some("ascii") | None => ascii(text_of(self.array), self.count),
-            Some("binary" | "appended") => self.reader.payload(self.array)?.values(&self.reader.layout, self.count),
+            Some("binary" | "appended") => {
+                self.reader.take(self.count, size_of::<T>())?;
+                self.reader.payload(self.array)?.values(&self.reader.layout, self.count)
+            }
             Some(other) => Err(broken(format!("format '{other}' is unknown"))),
         }
     }

@@ -1,7 +1,7 @@
 //! Writes a cloud as VTK's UnstructuredGrid, one VERTEX cell per particle: the form that VTK, ParaView, pyvista and
 //! meshio all read to the bit. Little-endian, sizes in UInt64 (UInt32 ends at 4 GiB an array).
 
-use super::snapshot::{BLOCK, Values, View};
+use super::view::{BLOCK, Values, View};
 use flate2::{Compress, Compression, FlushCompress, Status};
 use std::borrow::Cow;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -26,24 +26,27 @@ pub enum Encoding {
 pub fn write(sink: impl Write + Seek, view: &View, options: Options) -> io::Result<()> {
     // An empty array has no block to compress, and meshio cannot join no blocks.
     let options = Options { zlib: options.zlib && view.n > 0, ..options };
-    let n = view.n;
-    let connectivity = Values::computed(n, |first, block: &mut [i64]| count_from(first, block));
-    let offsets = Values::computed(n, |first, block: &mut [i64]| count_from(first + 1, block));
-    let types = Values::computed(n, |_, block: &mut [u8]| block.fill(VERTEX));
+    let (cells, kind) = cells_of(view.n);
+    let connectivity = Values::computed(view.n, |first, block: &mut [i64]| count_from(first, block));
+    let offsets = Values::computed(cells, |first, block: &mut [i64]| match view.n {
+        0 => block.fill(0),
+        _ => count_from(first + 1, block),
+    });
+    let types = Values::computed(cells, |_, block: &mut [u8]| block.fill(kind));
 
     let mut file = VtuFile { sink, options, appended: Vec::new() };
     file.open(view)?;
     file.section("Points", [("Points", 3, &view.points)])?;
-    if n > 0 {
-        // meshio stumbles over cells that are none.
-        file.section("Cells", [("connectivity", 1, &connectivity), ("offsets", 1, &offsets), ("types", 1, &types)])?;
-    }
+    file.section("Cells", [("connectivity", 1, &connectivity), ("offsets", 1, &offsets), ("types", 1, &types)])?;
     file.section("PointData", view.fields.iter().map(|f| (f.name.as_ref(), f.components, &f.values)))?;
     file.close()
 }
 
-/// VTK's number of the cell that is one point.
-const VERTEX: u8 = 1;
+/// Number and type of the cells of `n` points: VERTEX each. meshio cannot read a file without cells, so no points make one
+/// POLY_VERTEX of no points, which meshio passes over.
+fn cells_of(n: usize) -> (usize, u8) {
+    if n == 0 { (1, 2) } else { (n, 1) }
+}
 
 fn count_from(first: usize, block: &mut [i64]) {
     block.iter_mut().enumerate().for_each(|(i, value)| *value = (first + i) as i64);
@@ -67,7 +70,7 @@ struct VtuFile<'a, W> {
 impl<'a, W: Write + Seek> VtuFile<'a, W> {
     fn open(&mut self, view: &View) -> io::Result<()> {
         let compressor = if self.options.zlib { " compressor=\"vtkZLibDataCompressor\"" } else { "" };
-        let n = view.n;
+        let (n, cells) = (view.n, cells_of(view.n).0);
         writeln!(self.sink, "<?xml version=\"1.0\"?>")?;
         writeln!(
             self.sink,
@@ -83,7 +86,7 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
             self.metadata("Int8", name, text.bytes().map(|b| b as i8))?;
         }
         writeln!(self.sink, "</FieldData>")?;
-        writeln!(self.sink, "<Piece NumberOfPoints=\"{n}\" NumberOfCells=\"{n}\">")
+        writeln!(self.sink, "<Piece NumberOfPoints=\"{n}\" NumberOfCells=\"{cells}\">")
     }
 
     fn metadata<T: std::fmt::Debug>(
@@ -121,8 +124,7 @@ impl<'a, W: Write + Seek> VtuFile<'a, W> {
         match self.options.encoding {
             Encoding::Base64 => {
                 writeln!(self.sink, " format=\"binary\">")?;
-                let mut text =
-                    Base64 { sink: &mut self.sink, waiting: Vec::with_capacity(2 * CHUNK), text: String::new() };
+                let mut text = Base64 { sink: &mut self.sink, waiting: Vec::with_capacity(CHUNK), text: String::new() };
                 store(values, self.options.zlib, &mut text, |t| t.finish())?;
                 writeln!(self.sink, "\n</DataArray>")
             }
@@ -300,11 +302,7 @@ mod tests {
         for (attribute, field) in piece.data.point.iter().zip(&snapshot.fields) {
             let Attribute::DataArray(array) = attribute else { panic!("{attribute:?}") };
             assert_eq!((&array.name, array.num_comp()), (&field.name, field.components));
-            let bytes = |data: &super::super::Data| {
-                let mut all = Vec::new();
-                data.values().blocks::<()>(|block| Ok(all.extend_from_slice(block))).unwrap();
-                all
-            };
+            let bytes = |data: &super::super::Data| data.values().bytes().unwrap();
             let theirs = super::super::legacy::data(array.data.clone()).unwrap();
             assert!(theirs.type_name() == field.data.type_name() && bytes(&theirs) == bytes(&field.data));
         }

@@ -46,7 +46,13 @@ pub enum Access {
     Output,
 }
 
-const fn input(name: &'static str, unit: &'static str, domain: Domain, default: Option<f64>, about: &'static str) -> Field {
+const fn input(
+    name: &'static str,
+    unit: &'static str,
+    domain: Domain,
+    default: Option<f64>,
+    about: &'static str,
+) -> Field {
     Field { name, unit, about, vector: false, access: Access::Input { domain, default } }
 }
 
@@ -171,9 +177,19 @@ mod tests {
     #[test]
     fn slots_are_the_positions_of_the_inputs() {
         let named = [
-            (T, "T"), (M, "m"), (RHO, "rho"), (H, "h"), (KAPPA, "kappa"), (C_V, "c_v"), (FIXED, "fixed"),
-            (SOURCE, "source"), (FLUX_IN, "flux_in"), (H_CONV, "h_conv"), (EMISSIVITY, "emissivity"),
-            (T_AMBIENT, "T_ambient"), (AREA, "area"),
+            (T, "T"),
+            (M, "m"),
+            (RHO, "rho"),
+            (H, "h"),
+            (KAPPA, "kappa"),
+            (C_V, "c_v"),
+            (FIXED, "fixed"),
+            (SOURCE, "source"),
+            (FLUX_IN, "flux_in"),
+            (H_CONV, "h_conv"),
+            (EMISSIVITY, "emissivity"),
+            (T_AMBIENT, "T_ambient"),
+            (AREA, "area"),
         ];
         assert_eq!(named.len(), INPUTS);
         for (at, name) in named {

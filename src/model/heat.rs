@@ -5,7 +5,7 @@
 use super::conductivity::Law;
 use super::surface::Surface;
 use crate::error::{Error, Result};
-use crate::operator::{Mean, once::Matrix};
+use crate::operator::{Mean, Pairs};
 use crate::pool::{BLOCK, Pool};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -39,7 +39,7 @@ pub enum Release<'a> {
 /// The right-hand side, with everything that the scene needs and nothing else.
 pub struct Heat<'a> {
     pub pool: &'a Pool,
-    pub matrix: &'a Matrix,
+    pub pairs: Pairs<'a>,
     pub mean: Mean,
     /// 1/(m c_v), 0 where T is fixed.
     pub inverse_capacity: &'a [f64],
@@ -68,7 +68,7 @@ impl Heat<'_> {
         }
         self.applications += 1;
         self.kappa_of_t(time, t)?;
-        self.diffuse(t, rate);
+        self.diffuse(t, rate)?;
         if let Some(surface) = self.surface {
             surface.add(t, self.inverse_capacity, rate);
         }
@@ -76,24 +76,36 @@ impl Heat<'_> {
     }
 
     /// The diffusive part of dT/dt alone, with the conductivity evaluated last.
-    pub fn diffuse(&self, t: &[f64], rate: &mut [f64]) {
-        let inverse = self.inverse_capacity;
-        let factor = if let Conductivity::Number(k) = self.conductivity { k } else { 1.0 };
-        self.matrix.apply(self.pool, self.pair_kappa(), t, rate, self.quiet, |i, sum| sum * factor * inverse[i]);
+    pub fn diffuse(&self, t: &[f64], rate: &mut [f64]) -> Result<()> {
+        let (inverse, factor, kappa) = (self.inverse_capacity, self.factor(), self.pair_kappa());
+        let finish = |i: usize, sum: f64| sum * factor * inverse[i];
+        match self.pairs {
+            Pairs::Fresh(assembly) => assembly.apply(self.pool, kappa, t, rate, finish)?,
+            Pairs::Stored(matrix) => matrix.apply(self.pool, kappa, t, rate, self.quiet, finish),
+        }
+        Ok(())
     }
 
-    /// For each particle the radius and the centre's size of its Gershgorin circle, in 1/s.
+    /// For each particle the radius and the centre's size of its Gershgorin circle, in 1/s. Needs stored weights.
     pub fn circles(&mut self, time: f64, t: &[f64]) -> Result<Vec<(f64, f64)>> {
         self.kappa_of_t(time, t)?;
-        let factor = if let Conductivity::Number(k) = self.conductivity { k } else { 1.0 };
-        let mut circles = self.matrix.circles(self.pool, self.pair_kappa())?;
+        let Pairs::Stored(matrix) = self.pairs else {
+            return Err(Error::OutOfOrder { call: "a bound".into(), missing: "stored weights".into() });
+        };
+        let mut circles = matrix.circles(self.pool, self.pair_kappa())?;
         for ((radius, centre), inverse) in circles.iter_mut().zip(self.inverse_capacity) {
-            (*radius, *centre) = (*radius * factor * inverse, *centre * factor * inverse);
+            let scale = self.factor() * inverse;
+            (*radius, *centre) = (*radius * scale, *centre * scale);
         }
         if let Some(surface) = self.surface {
             surface.slopes(t, |i, slope| circles[i].1 += slope * self.inverse_capacity[i]);
         }
         Ok(circles)
+    }
+
+    /// What all pair sums are multiplied by.
+    fn factor(&self) -> f64 {
+        if let Conductivity::Number(kappa) = self.conductivity { kappa } else { 1.0 }
     }
 
     pub fn kappa_is_constant(&self) -> bool {

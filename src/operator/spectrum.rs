@@ -5,12 +5,13 @@ use crate::memory;
 use crate::pool::Pool;
 use crate::sum;
 
-/// Power iteration approaches from below; this factor covers what is left after it stops.
+/// Power iteration approaches from below; this factor covers what is left after it stops: on lattices, 20 to 100 %
+/// jitter, 2-D and 3-D, M4, M6 and C4, it had reached 0.92 or more of the largest eigenvalue (Gershgorin: 1.4 to 1.8).
 const SAFETY: f64 = 1.1;
 const MOST: usize = 100;
-const LEAST: usize = 10;
+const LEAST: usize = 16;
 /// Growth per iteration below which it stops.
-const SETTLED: f64 = 1e-3;
+const SETTLED: f64 = 3e-3;
 
 /// An upper bound on the largest eigenvalue of A = C⁻¹ L: 1.1 times its estimate by power iteration in the norm
 /// Σ C x², in which A is symmetric, but never more than `gershgorin`, which is a proven bound.

@@ -21,6 +21,10 @@ pub struct Facts {
     /// Particles that exchange heat with the outside.
     pub exchanging: usize,
     pub heated: bool,
+    /// The host has asked for rates and never for a step.
+    pub rate_only: bool,
+    /// Weights are scaled by their own moments, which must be known first.
+    pub normalised: bool,
     /// The operator has no negative weight.
     pub positive: bool,
     /// The integrator promises the maximum principle, and nothing heats.

@@ -74,25 +74,48 @@ impl Plan {
             add("density", setup, 16.0 * n, pairs, what.into());
         }
         let evaluations = if self.leaves_out("same_h") { "one kernel evaluation" } else { "two kernel evaluations" };
-        add("weights", setup, pairs * 12.0 + 4.0 * n, pairs, format!("{} w_ab, {evaluations} per pair", facts.operator));
+        add(
+            "weights",
+            setup,
+            pairs * 10.0 + 4.0 * n,
+            pairs,
+            format!("{} w_ab, {evaluations} per pair", facts.operator),
+        );
         if choices.normalise {
             add("normalise", setup, 8.0 * n, pairs, "pairs scaled by the mean of 1/K_a and 1/K_b".into());
         }
         if self.leaves_out("frozen") && !self.leaves_out("uniform_kappa") {
             add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", choices.mean.name()));
         }
-        let bound_when = if facts.kappa_of_t { When::EachStep } else { setup };
-        add("bound", bound_when, 0.0, pairs, "Gershgorin's circles; power iteration where it saves stages".into());
-        if facts.kappa_of_t {
-            add("kappa", When::EachStage, 8.0 * n, 0.0, "kappa(T)".into());
+        if self.leaves_out("rate_only") {
+            add("rate", When::EachStep, 0.0, pairs, "du/dt for a host that integrates itself".into());
+        } else {
+            self.list_motion(facts, setup, &mut add);
         }
-        add("stages", When::EachStage, facts.buffers * 8.0 * n, pairs, format!("{}: rows of weights", facts.integrator));
         if !self.leaves_out("no_wall") {
             add("surface", When::EachStage, 48.0 * facts.exchanging as f64, 0.0, "exchange with the outside".into());
         }
         if !self.leaves_out("no_source") {
             add("source", When::EachStage, 8.0 * n, 0.0, "heat released in the volume".into());
         }
+        list
+    }
+
+    /// The passes that move T.
+    fn list_motion(&self, facts: &Facts, setup: When, add: &mut impl FnMut(&'static str, When, f64, f64, String)) {
+        let (n, pairs) = (facts.n as f64, facts.n as f64 * facts.neighbours);
+        let bound_when = if facts.kappa_of_t { When::EachStep } else { setup };
+        add("bound", bound_when, 0.0, pairs, "Gershgorin's circles; power iteration where it saves stages".into());
+        if facts.kappa_of_t {
+            add("kappa", When::EachStage, 8.0 * n, 0.0, "kappa(T)".into());
+        }
+        add(
+            "stages",
+            When::EachStage,
+            facts.buffers * 8.0 * n,
+            pairs,
+            format!("{}: rows of weights", facts.integrator),
+        );
         let mut promises = vec!["finite"];
         if facts.keeps_bounds {
             promises.push("within the bounds of before");
@@ -102,7 +125,6 @@ impl Plan {
         }
         add("check", When::EachStep, 0.0, 0.0, promises.join(", "));
         add("commit", When::EachStep, 0.0, 0.0, "the new state replaces the old".into());
-        list
     }
 }
 
@@ -115,8 +137,8 @@ impl fmt::Display for Plan {
                 When::EachStep => "each step",
                 When::EachStage => "each stage",
             };
-            let size = |v: f64, unit: &str| if v == 0.0 { String::new() } else { format!("{} {unit}", readable(v)) };
-            let (bytes, pairs) = (size(pass.bytes, "B"), size(pass.pairs, "pairs"));
+            let size = |v: f64, unit: &str| if v == 0.0 { String::new() } else { format!("{}{unit}", readable(v)) };
+            let (bytes, pairs) = (size(pass.bytes, "B"), size(pass.pairs, " pairs"));
             let line = format!("  {when:<11}{:<10}{bytes:>9} {pairs:>12}  {}", pass.name, pass.about);
             writeln!(f, "{}", line.trim_end())?;
         }
@@ -126,8 +148,7 @@ impl fmt::Display for Plan {
             }
             writeln!(f, "{title}")?;
             for rule in rules {
-                let exact = if rule.exact { "same bits" } else { "same to rounding" };
-                writeln!(f, "  {:<14}{} ({exact})", rule.name, rule.reason)?;
+                writeln!(f, "  {:<14}{} ({})", rule.name, rule.reason, rule.same)?;
             }
             Ok(())
         };
@@ -141,6 +162,6 @@ pub fn readable(v: f64) -> String {
     let scales = [(1e12, " T"), (1e9, " G"), (1e6, " M"), (1e3, " k")];
     match scales.iter().find(|(scale, _)| v >= *scale) {
         Some((scale, unit)) => format!("{:.1}{unit}", v / scale),
-        None => format!("{v:.0}"),
+        None => format!("{v:.0} "),
     }
 }

@@ -40,10 +40,12 @@ impl Motion<'_> {
     /// Advances `t` by exactly `dt` from `time`. Where the operator changes with T, bounds and schedule are made anew
     /// for each sub-step.
     pub fn advance(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        let reference = self.norm(|i| t[i]);
         let mut done = 0.0;
         while done < dt && !t.is_empty() {
             let bounds = self.bounds(time + done, dt - done, t)?;
-            let (method, schedule) = self.schedule(dt - done, bounds)?;
+            let part = self.practical_limit(time + done, t, bounds, reference)?.min(dt - done);
+            let (method, schedule) = self.schedule(part, bounds)?;
             if report.substeps == 0 {
                 report.limit = explicit_limit(bounds);
             }
@@ -57,9 +59,31 @@ impl Motion<'_> {
                 self.tell(time, dt, done + schedule.start(k + 1))?;
             }
             self.timers.add("stages", start.elapsed());
-            done = if steps == schedule.substeps { dt } else { done + schedule.start(steps) };
+            let to_the_end = part == dt - done && steps == schedule.substeps;
+            done = if to_the_end { dt } else { done + schedule.start(steps) };
         }
         Ok(())
+    }
+
+    /// The longest sub-step of a stabilised method in which T changes, at the present rate, by no more than `change`
+    /// times its spread at the beginning. Stability allows more, but then one sub-step of second order would have to
+    /// follow a decay by several factors of e, and modes that it cannot resolve would ring instead of dying (the
+    /// practical step limit of Caplan et al. 2024 has the same purpose). Never below what three stages can do.
+    fn practical_limit(&mut self, time: f64, t: &[f64], bounds: Bounds, reference: f64) -> Result<f64> {
+        let (method, options) = (self.choices.method, &self.choices.options);
+        if !method.is_stabilised() || options.stages.is_some() || self.choices.change.is_infinite() {
+            return Ok(f64::INFINITY);
+        }
+        let mut rate = memory::filled("rate", t.len(), 0.0)?;
+        self.heat.rate(time, t, &mut rate)?;
+        let speed = self.norm(|i| rate[i]);
+        Ok((self.choices.change * reference / speed).max(method.limit(bounds)))
+    }
+
+    /// The spread of a quantity over the volume.
+    fn norm(&self, value: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
+        let volume = self.heat.volume;
+        sum::spread(self.pool, volume.len(), |i| volume[i], value)
     }
 
     /// Whether the operator stays the same while T changes.
@@ -77,13 +101,13 @@ impl Motion<'_> {
     }
 
     /// Bounds that are good enough for a step of `dt`.
-    fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
+    pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
         if let Some(bounds) = self.known.filter(|_| self.is_linear()) {
             return Ok(bounds);
         }
         let start = Instant::now();
         let mut bounds = self.proven_bounds(time, t)?;
-        if !(self.plan.leaves_out("proven_bound") && self.is_least_work(dt, bounds)?) {
+        if !(self.plan.leaves_out("proven_bound") && self.is_least_work(dt, bounds)) {
             bounds = self.refine(bounds, t)?;
             *self.known = Some(bounds).filter(|_| self.is_linear());
         }
@@ -91,11 +115,13 @@ impl Motion<'_> {
         Ok(bounds)
     }
 
-    /// A bound of zero shows the least work there can be; a bound that asks for no more need not be refined.
-    fn is_least_work(&self, dt: f64, bounds: Bounds) -> Result<bool> {
+    /// The largest eigenvalue is at least the largest diagonal element: a bound that asks for no more work than that
+    /// need not be refined.
+    fn is_least_work(&self, dt: f64, bounds: Bounds) -> bool {
         let (method, options) = (self.choices.method, &self.choices.options);
-        let least = method.schedule(dt, Bounds { spectral: 0.0, diagonal: 0.0 }, options)?;
-        Ok(method.schedule(dt, bounds, options).is_ok_and(|s| s.applications() <= least.applications()))
+        let least = method.schedule(dt, Bounds { spectral: bounds.diagonal, ..bounds }, options);
+        let applications = |s: Result<Schedule>| s.map_or(u64::MAX, |s| s.applications());
+        applications(method.schedule(dt, bounds, options)) <= applications(least)
     }
 
     /// Gershgorin's bounds: proven, for any operator and any kappa.
@@ -124,7 +150,7 @@ impl Motion<'_> {
         let mut applications = 0;
         let spectral = spectrum::largest(pool, &weight, proven.spectral, |x, y| {
             applications += 1;
-            heat.diffuse(x, y);
+            heat.diffuse(x, y)?;
             pool.chunks(&mut y[..slopes.len()], BLOCK, |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, y)| *y -= slopes[start + k] * x[start + k]);
             });

@@ -1,15 +1,15 @@
 //! The passes that make what the stages need: sort, density, weights, normalise, fold, capacity, surface, bound. Each
 //! runs only where its product is missing.
 
-use super::state::{Geometry, Input, State, Weights};
 use super::Plan;
 use super::motion::Motion;
+use super::state::{Geometry, Input, State, Weights};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Slot};
 use crate::model::heat::{Conductivity, Heat, Release};
 use crate::model::surface::{Exchange, Surface};
-use crate::operator::Assembly;
+use crate::operator::{Assembly, Pairs};
 use crate::space::{Cloud, density, rows::Rows};
 use std::borrow::Cow;
 
@@ -35,6 +35,17 @@ impl State {
     /// # Errors
     /// `OutOfOrder` naming what is missing, `BoxTooSmall`, `NoMemory`, `BadElement` naming a particle.
     pub fn prepare(&mut self, call: &str) -> Result<Plan> {
+        let plan = self.prepare_fresh(call)?;
+        self.prepare_weights(&plan)?;
+        self.fold_kappa(&plan)?;
+        Ok(plan)
+    }
+
+    /// The same without stored weights: enough for one application.
+    ///
+    /// # Errors
+    /// As [`State::prepare`].
+    pub fn prepare_fresh(&mut self, call: &str) -> Result<Plan> {
         self.cloud(call)?;
         for slot in [fields::T, fields::M] {
             self.need(slot, call)?;
@@ -43,8 +54,6 @@ impl State {
             self.need(fields::KAPPA, call)?;
         }
         let plan = self.plan()?;
-        self.prepare_weights(&plan)?;
-        self.fold_kappa(&plan)?;
         self.prepare_capacity()?;
         self.prepare_surface(&plan)?;
         Ok(plan)
@@ -225,20 +234,20 @@ impl State {
         let uniform = plan.leaves_out("uniform_kappa");
         let mut evaluated = memory::filled("kappa", if self.kappa_of_t() { n } else { 0 }, 0.0)?;
         let mut released = memory::filled("source", if self.source_host.is_some() { n } else { 0 }, 0.0)?;
-        let (Some(weights), Some(g), Some(cloud), Some(inverse_capacity)) =
-            (&self.weights, &self.geometry, &self.cloud, &self.inverse_capacity)
+        let (Some(g), Some(cloud), Some(inverse_capacity)) = (&self.geometry, &self.cloud, &self.inverse_capacity)
         else {
             return Err(Error::OutOfOrder { call: "rate".into(), missing: "set_particles".into() });
         };
         let each = |slot: Slot, wanted: bool| self.inputs[slot].view(if wanted { n } else { 0 });
-        let by_pair = !uniform && !self.law.is_some() && self.kappa_host.is_none() && !weights.folded;
+        let folded = self.weights.as_ref().is_some_and(|w| w.folded);
+        let by_pair = !uniform && self.law.is_none() && self.kappa_host.is_none() && !folded;
         let kappa = each(fields::KAPPA, by_pair)?;
         let source = each(fields::SOURCE, !plan.leaves_out("no_source"))?;
         let conductivity = match (&mut self.kappa_host, &self.law, &self.inputs[fields::KAPPA]) {
             (Some(host), ..) => Conductivity::Host(host, &mut evaluated),
             (None, Some(law), _) => Conductivity::Law(law, &mut evaluated),
             (None, None, Input::Number(k)) if uniform => Conductivity::Number(*k),
-            _ if weights.folded => Conductivity::Folded,
+            _ if folded => Conductivity::Folded,
             _ => Conductivity::Field(&kappa),
         };
         let release = match &mut self.source_host {
@@ -246,9 +255,20 @@ impl State {
             None if plan.leaves_out("no_source") => Release::None,
             None => Release::Field(&source),
         };
+        let (rows, assembly);
+        let pairs = match &self.weights {
+            Some(weights) => Pairs::Stored(&weights.matrix),
+            None => {
+                rows = Rows::new(cloud, &g.h, self.choices.kernel.radius(), &self.pool)?;
+                let (operator, kernel, same_h) =
+                    (self.choices.operator, &self.choices.kernel, plan.leaves_out("same_h"));
+                assembly = Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h };
+                Pairs::Fresh(&assembly)
+            }
+        };
         let heat = Heat {
             pool: &self.pool,
-            matrix: &weights.matrix,
+            pairs,
             mean: self.choices.mean,
             inverse_capacity,
             conductivity,

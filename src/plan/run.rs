@@ -34,7 +34,7 @@ impl State {
         self.cancel.store(false, Ordering::Relaxed);
         let start = Instant::now();
         if self.choices.without("at_rest") && self.steps > 0 {
-            self.drop_geometry();
+            self.forget_geometry();
         }
         let plan = self.prepare("step")?;
         let (mut t, time, applications) = (self.each(fields::T)?, self.time, self.applications);
@@ -57,12 +57,25 @@ impl State {
     }
 
     /// dT/dt now.
+    ///
+    /// # Errors
+    /// Any error of [`State::prepare`]; `CallbackFailed`.
     pub fn rate(&mut self) -> Result<Vec<f64>> {
         self.cancel.store(false, Ordering::Relaxed);
-        let plan = self.prepare("rate")?;
+        self.rates += 1;
+        let mut plan = self.prepare_fresh("rate")?;
+        if !plan.leaves_out("used_once") {
+            plan = self.prepare("rate")?;
+        }
         let (t, time) = (self.each(fields::T)?, self.time);
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
-        self.with_motion(&plan, |motion| motion.heat.rate(time, &t, &mut rate))?;
+        self.with_motion(&plan, |motion| {
+            if !plan.leaves_out("rate_only") {
+                motion.bounds(time, 0.0, &t)?;
+            }
+            motion.heat.rate(time, &t, &mut rate)
+        })?;
+        self.refuse_what_is_not_finite("dT/dt", &rate)?;
         Ok(rate)
     }
 
@@ -109,16 +122,23 @@ impl State {
     fn spread(&self, t: &[f64]) -> f64 {
         let Some(inverse) = &self.inverse_capacity else { return 0.0 };
         let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
-        let total = sum::sum(&self.pool, t.len(), weight);
-        let mean = sum::sum(&self.pool, t.len(), |i| weight(i) / total * t[i]);
-        sum::sum(&self.pool, t.len(), |i| weight(i) / total * (t[i] - mean) * (t[i] - mean)).sqrt()
+        sum::spread(&self.pool, t.len(), weight, |i| t[i])
+    }
+
+    /// The host's number of a particle.
+    fn host(&self, i: usize) -> usize {
+        self.cloud.as_ref().map_or(i, |c| c.host[i] as usize)
+    }
+
+    fn refuse_what_is_not_finite(&self, what: &str, values: &[f64]) -> Result<()> {
+        match sum::first(&self.pool, values.len(), |i| !values[i].is_finite()) {
+            Some(i) => Err(Error::NotFinite { what: what.into(), index: self.host(i), value: values[i] }),
+            None => Ok(()),
+        }
     }
 
     fn check(&self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
-        let host = |i: usize| self.cloud.as_ref().map_or(i, |c| c.host[i] as usize);
-        if let Some(i) = sum::first(&self.pool, t.len(), |i| !t[i].is_finite()) {
-            return Err(Error::NotFinite { what: "T".into(), index: host(i), value: t[i] });
-        }
+        self.refuse_what_is_not_finite("T", t)?;
         let slack = ROUNDING * before.high.abs().max(before.low.abs());
         if self.may_grow(plan) {
             let after = self.spread(t);
@@ -131,7 +151,7 @@ impl State {
             let (low, high) = (before.low - slack, before.high + slack);
             if let Some(i) = sum::first(&self.pool, t.len(), |i| t[i] < low || t[i] > high) {
                 let promise = format!("{} with bounds=keep", self.choices.method.name);
-                return Err(Error::OutOfBounds { index: host(i), value: t[i], low, high, promise });
+                return Err(Error::OutOfBounds { index: self.host(i), value: t[i], low, high, promise });
             }
         }
         Ok(())

@@ -99,8 +99,9 @@ pub struct State {
     pub surface: Option<Surface>,
     pub bounds: Option<Bounds>,
 
-    /// Steps taken, and whether particles or kappa changed after the first.
+    /// Steps taken and rates asked for, and whether particles or kappa changed after the first.
     pub steps: u64,
+    pub rates: u64,
     pub moves: bool,
     pub kappa_changes: bool,
     pub timers: Timers,
@@ -128,6 +129,7 @@ impl State {
             surface: None,
             bounds: None,
             steps: 0,
+            rates: 0,
             moves: false,
             kappa_changes: false,
             timers: Timers::default(),
@@ -230,7 +232,8 @@ impl State {
         }
         let mut volume = 1.0;
         for axis in 0..self.dim() {
-            let range = (0..x.len()).map(|i| x.at(i, axis)).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
+            let range =
+                (0..x.len()).map(|i| x.at(i, axis)).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
             volume *= if self.domain.periodic[axis] { self.domain.length(axis) } else { (range.1 - range.0).max(0.0) };
         }
         radius * self.choices.h_fac * (volume / x.len().max(1) as f64).powf(1.0 / self.dim() as f64)
@@ -255,14 +258,19 @@ impl State {
 
     /// Positions, masses, densities or smoothing lengths changed.
     pub fn drop_geometry(&mut self) {
-        self.moves |= self.steps > 0;
+        self.moves |= self.steps + self.rates > 0;
+        self.forget_geometry();
+    }
+
+    /// Makes the next step build everything anew.
+    pub fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
         (self.surface, self.bounds) = (None, None);
     }
 
     /// The conductivity changed.
     pub fn drop_kappa(&mut self) {
-        self.kappa_changes |= self.steps > 0;
+        self.kappa_changes |= self.steps + self.rates > 0;
         self.bounds = None;
         if self.weights.as_ref().is_some_and(|w| w.folded) {
             self.weights = None;
@@ -299,7 +307,9 @@ impl State {
             return 0;
         }
         let flows = |i: usize| {
-            [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY].iter().any(|&s| self.inputs[s].at(i).unwrap_or(0.0) != 0.0)
+            [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY]
+                .iter()
+                .any(|&s| self.inputs[s].at(i).unwrap_or(0.0) != 0.0)
         };
         (0..self.len()).filter(|&i| flows(i)).count()
     }
@@ -330,6 +340,8 @@ impl State {
             kappa_changes: self.kappa_changes,
             exchanging,
             heated,
+            rate_only: self.rates > 0 && self.steps == 0,
+            normalised: choices.normalise,
             positive: choices.operator.positive,
             keeps_bounds: choices.operator.positive && strong_stability && !heated && exchanging == 0,
             operator: choices.operator.name,

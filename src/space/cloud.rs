@@ -129,9 +129,8 @@ impl Cloud {
 
     /// Whether the host's positions are the ones held here, bit for bit after wrapping.
     pub fn is_at(&self, x: Strided, pool: &Pool) -> bool {
-        let moved = |i: usize| {
-            (0..self.dim()).any(|a| self.x[a][i] != self.domain.wrap(a, x.at(self.host[i] as usize, a)))
-        };
+        let moved =
+            |i: usize| (0..self.dim()).any(|a| self.x[a][i] != self.domain.wrap(a, x.at(self.host[i] as usize, a)));
         x.len() == self.len() && crate::sum::first(pool, self.len(), moved).is_none()
     }
 

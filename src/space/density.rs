@@ -52,7 +52,11 @@ impl Count {
         let mut h = most;
         for _ in 0..NEWTON {
             let (n, slope) = self.at(kernel, mass, row, h);
-            if n > target { high = h } else { low = h }
+            if n > target {
+                high = h
+            } else {
+                low = h
+            }
             let newton = h - (n - target) / slope;
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
             let done = (next - h).abs() <= ACCURACY * h;
@@ -198,7 +202,8 @@ mod tests {
                 let x = lattice(n, dim, jitter);
                 let domain = Domain::new(&[0.0; 3][..dim], &[1.0; 3][..dim], &[periodic; 3][..dim]).unwrap();
                 let particles = n.pow(dim as u32);
-                let cloud = Cloud::sort(&domain, Strided::new("x", &x, particles, dim, dim).unwrap(), 0.0, &pool).unwrap();
+                let cloud =
+                    Cloud::sort(&domain, Strided::new("x", &x, particles, dim, dim).unwrap(), 0.0, &pool).unwrap();
                 // Unequal masses: N(h) weighs neighbours by their mass.
                 let mass: Vec<f64> = (0..particles).map(|i| 1.0 + 0.3 * ((i % 7) as f64)).collect();
                 let h = smoothing_lengths(&kernel, kernel.h_fac(), &cloud, &mass, &pool).unwrap();

@@ -151,6 +151,7 @@ impl<'a> Rows<'a> {
         let same_h = self.cells.same_h;
         s.clear_candidates();
         let (mut shifted, mut failed) = (false, Ok(()));
+        let lengths = (!same_h).then_some((self.h, self.radius));
         for level in &self.cells.levels {
             let reach = self.radius * h_group.max(level.h_max);
             // Slack for rounding of the interval ends; the distance test below decides, and it is symmetric.
@@ -160,10 +161,15 @@ impl<'a> Rows<'a> {
             for a in 0..dim {
                 (from[a], to[a]) = (lo[a] - pad(lo[a]), hi[a] + pad(hi[a]));
             }
+            let wraps = (0..dim).any(|a| self.cloud.domain.images(a, from[a], to[a]) != (0..=0));
+            if wraps && !shifted {
+                // So far no candidate was an image.
+                shifted = true;
+                s.add_zero_shifts()?;
+            }
             self.for_images(from, to, |shift, from, to| {
-                shifted |= shift != [0.0; 3];
                 level.overlapping(self.cloud, from, to, |cell| {
-                    let added = s.add_candidates(self.cloud, cell, shift, (!same_h).then_some((self.h, self.radius)));
+                    let added = s.add_candidates(self.cloud, cell, shifted.then_some(shift), lengths);
                     if added.is_err() {
                         failed = added;
                     }
@@ -201,79 +207,136 @@ impl<'a> Rows<'a> {
 
     /// Fills the scratch row with the candidates that are within reach of particle i; returns how many.
     fn hits<const D: usize, const SHIFTED: bool>(&self, i: usize, s: &mut Scratch) -> Result<usize> {
-        let n = s.j.len();
-        s.reserve_row(n, D)?;
-        let xi: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
-        let x: [&[f64]; D] = std::array::from_fn(|a| &s.x[a][..n]);
-        let shift: [&[f64]; D] = std::array::from_fn(|a| if SHIFTED { &s.shift[a][..n] } else { &s.x[a][..n] });
-        let delta = |a: usize, c: usize| {
-            let d = x[a][c] - xi[a];
-            if SHIFTED { d + shift[a][c] } else { d }
-        };
-        let r2 = &mut s.r2[..n];
-        for (c, r2) in r2.iter_mut().enumerate() {
-            let mut sum = 0.0;
-            for a in 0..D {
-                let d = delta(a, c);
-                sum += d * d;
-            }
-            *r2 = sum;
-        }
+        s.reserve_row(s.j.len(), D)?;
+        let centre: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
         let reach = self.radius * self.h[i];
         let own = reach * reach;
-        let hits = &mut s.hits[..n];
-        let mut found = 0;
-        if self.cells.same_h {
-            for (c, &r2) in s.r2[..n].iter().enumerate() {
-                hits[found] = c as u32;
-                found += usize::from(r2 < own);
-            }
-        } else {
-            for (c, (&r2, &cut2)) in s.r2[..n].iter().zip(&s.cut2[..n]).enumerate() {
-                hits[found] = c as u32;
-                found += usize::from(r2 < own.max(cut2));
-            }
+        #[cfg(target_arch = "x86_64")]
+        if is_x86_feature_detected!("avx2") {
+            // SAFETY: this processor has AVX2.
+            return Ok(unsafe { s.select_avx2::<D, SHIFTED>(i, centre, own, self.cells.same_h) });
         }
-        let mut len = 0;
-        for &c in &hits[..found] {
-            let c = c as usize;
-            let d: [f64; D] = std::array::from_fn(|a| delta(a, c));
-            s.row_j[len] = s.j[c];
-            s.row_r[len] = s.r2[c];
-            for a in 0..D {
-                s.row_d[a][len] = d[a];
-            }
-            let itself = s.j[c] as usize == i && (!SHIFTED || (0..D).all(|a| shift[a][c] == 0.0));
-            len += usize::from(!itself);
-        }
-        s.row_r[..len].iter_mut().for_each(|r| *r = r.sqrt());
-        Ok(len)
+        Ok(s.select::<D, SHIFTED>(i, centre, own, self.cells.same_h))
     }
 }
 
 impl Scratch {
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2")]
+    fn select_avx2<const D: usize, const SHIFTED: bool>(
+        &mut self,
+        i: usize,
+        centre: [f64; D],
+        own: f64,
+        same_h: bool,
+    ) -> usize {
+        self.select::<D, SHIFTED>(i, centre, own, same_h)
+    }
+
+    /// Moves the candidates with r² < max(own, cut2) into the row. No closures here: they would be compiled once,
+    /// without the caller's processor features.
+    #[inline(always)]
+    fn select<const D: usize, const SHIFTED: bool>(
+        &mut self,
+        i: usize,
+        centre: [f64; D],
+        own: f64,
+        same_h: bool,
+    ) -> usize {
+        let n = self.j.len();
+        let (r2, hits) = (&mut self.r2[..n], &mut self.hits[..n]);
+        r2.fill(0.0);
+        for (a, centre) in centre.iter().enumerate() {
+            let x = &self.x[a][..n];
+            if SHIFTED {
+                for ((r2, x), shift) in r2.iter_mut().zip(x).zip(&self.shift[a][..n]) {
+                    let d = (x - centre) + shift;
+                    *r2 += d * d;
+                }
+            } else {
+                for (r2, x) in r2.iter_mut().zip(x) {
+                    let d = x - centre;
+                    *r2 += d * d;
+                }
+            }
+        }
+        // Every candidate is written, and the end moves on only for a hit: no branch to mispredict.
+        let mut found = 0;
+        for (c, r2) in r2.iter().enumerate() {
+            let cut2 = if same_h { own } else { own.max(self.cut2[c]) };
+            // SAFETY: found <= c < n, the length of hits.
+            unsafe { *hits.get_unchecked_mut(found) = c as u32 };
+            found += usize::from(*r2 < cut2);
+        }
+        self.fill_row::<D, SHIFTED>(i, centre, found)
+    }
+
+    #[inline(always)]
+    fn fill_row<const D: usize, const SHIFTED: bool>(&mut self, i: usize, centre: [f64; D], found: usize) -> usize {
+        let mut len = 0;
+        for k in 0..found {
+            // The particle itself is a candidate too, but not its own neighbour; its images are.
+            let c = self.hits[k] as usize;
+            let mut here = self.j[c] as usize == i;
+            for a in 0..D {
+                here &= !SHIFTED || self.shift[a][c] == 0.0;
+            }
+            self.hits[len] = c as u32;
+            len += usize::from(!here);
+        }
+        let hits = &self.hits[..len];
+        for (j, &c) in self.row_j[..len].iter_mut().zip(hits) {
+            *j = self.j[c as usize];
+        }
+        for (r, &c) in self.row_r[..len].iter_mut().zip(hits) {
+            *r = self.r2[c as usize];
+        }
+        for r in &mut self.row_r[..len] {
+            *r = r.sqrt();
+        }
+        for a in 0..D {
+            let (x, shift) = (&self.x[a], &self.shift[a]);
+            for (d, &c) in self.row_d[a][..len].iter_mut().zip(hits) {
+                let apart = x[c as usize] - centre[a];
+                *d = if SHIFTED { apart + shift[c as usize] } else { apart };
+            }
+        }
+        len
+    }
+
     fn clear_candidates(&mut self) {
         self.j.clear();
         self.cut2.clear();
         self.x.iter_mut().chain(&mut self.shift).for_each(Vec::clear);
     }
 
-    /// `lengths`: smoothing lengths and kernel radius, where they differ from particle to particle.
+    fn add_zero_shifts(&mut self) -> Result<()> {
+        let n = self.j.len();
+        for shift in &mut self.shift {
+            shift.try_reserve(n).map_err(|_| memory::no_memory::<f64>("neighbour candidates", n))?;
+            shift.resize(n, 0.0);
+        }
+        Ok(())
+    }
+
+    /// `shift`: where some candidates are images; `lengths`: smoothing lengths and kernel radius, where they differ.
     fn add_candidates(
         &mut self,
         cloud: &Cloud,
         cell: &[u32],
-        shift: Axes<f64>,
+        shift: Option<Axes<f64>>,
         lengths: Option<(&[f64], f64)>,
     ) -> Result<()> {
         let failed = |_| memory::no_memory::<f64>("neighbour candidates", cell.len());
         self.j.try_reserve(cell.len()).map_err(failed)?;
         self.j.extend_from_slice(cell);
-        for (a, &by) in shift.iter().enumerate().take(cloud.dim()) {
-            self.x[a].try_reserve(cell.len()).map_err(failed)?;
-            self.x[a].extend(cell.iter().map(|&j| cloud.x[a][j as usize]));
-            self.shift[a].try_reserve(cell.len()).map_err(failed)?;
-            self.shift[a].extend(cell.iter().map(|_| by));
+        for (a, x) in self.x.iter_mut().enumerate().take(cloud.dim()) {
+            x.try_reserve(cell.len()).map_err(failed)?;
+            x.extend(cell.iter().map(|&j| cloud.x[a][j as usize]));
+        }
+        for (all, by) in self.shift.iter_mut().zip(shift.iter().flatten()) {
+            all.try_reserve(cell.len()).map_err(failed)?;
+            all.resize(all.len() + cell.len(), *by);
         }
         if let Some((h, radius)) = lengths {
             self.cut2.try_reserve(cell.len()).map_err(failed)?;

@@ -1,0 +1,203 @@
+//! Speed of the work item that particle codes are compared on: a periodic cube of n³ particles, each moved by up to
+//! 20 % of the spacing, M4 with h_fac 1.3 (some 80 neighbours), stored weights.
+//!
+//! `cargo bench` times the parts with divan and then prints one table, its rows measured in turn in the same run: ns per
+//! particle-step and per pair, the set-up in steps, bytes per particle, and the share of the memory's read bandwidth
+//! that a step reaches. Where DIFFUSPH_PYTHON names a Python with scipy, its sparse product runs in turn with ours.
+//! `cargo bench -- --full` adds sizes up to 4 million particles.
+
+use diffusph::{Solver, Strided};
+use divan::Bencher;
+use divan::counter::{BytesCount, ItemsCount};
+use std::f64::consts::PI;
+use std::process::Command;
+use std::time::Instant;
+
+fn main() {
+    divan::main();
+    let full = std::env::args().any(|a| a == "--full");
+    // Without `--bench` cargo only checks that benchmarks start.
+    if std::env::args().any(|a| a == "--bench") {
+        table(if full { &[22, 50, 100, 159] } else { &[22, 50] });
+    }
+}
+
+struct Item {
+    n: usize,
+    x: Vec<f64>,
+    solver: Solver,
+    dt: f64,
+}
+
+fn positions(n: usize) -> Vec<f64> {
+    let mut state = 12345u64;
+    let mut uniform = || {
+        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    let cells = (0..n * n * n).flat_map(|p| [p % n, p / n % n, p / n / n]);
+    cells.map(|c| (c as f64 + 0.5 + 0.2 * uniform()) / n as f64).collect()
+}
+
+impl Item {
+    fn new(n: usize, threads: usize) -> Item {
+        let (x, count) = (positions(n), n * n * n);
+        let words = format!("heat dim=3 kernel=M4 h_fac=1.3 integrator=euler threads={threads}");
+        let mut solver = Solver::new(&words).unwrap();
+        solver.set_box(&[0.0; 3], &[1.0; 3], &[true; 3]).unwrap();
+        solver.set_particles(Strided::new("x", &x, count, 3, 3).unwrap()).unwrap();
+        for (name, value) in [("m", 1.0 / count as f64), ("rho", 1.0), ("kappa", 1.0)] {
+            solver.set_number(name, value).unwrap();
+        }
+        let t: Vec<f64> = x.chunks(3).map(|p| p.iter().map(|c| (2.0 * PI * c).sin()).product()).collect();
+        solver.set("T", Strided::packed(&t)).unwrap();
+        // A tenth of the explicit limit: one application of the operator, and no other bound is asked for.
+        let dt = 0.03 / (n * n) as f64;
+        Item { n, x, solver, dt }
+    }
+
+    fn count(&self) -> usize {
+        self.n * self.n * self.n
+    }
+
+    /// Seconds for one application of the operator, from a step of many.
+    fn step(&mut self, applications: usize) -> f64 {
+        let start = Instant::now();
+        let report = self.solver.step(self.dt * 10.0 * applications as f64).unwrap();
+        start.elapsed().as_secs_f64() / report.applications as f64
+    }
+
+    /// Seconds to find neighbours and make weights for particles that have moved.
+    fn set_up(&mut self) -> f64 {
+        self.x[0] += 1e-9;
+        let count = self.count();
+        self.solver.set_particles(Strided::new("x", &self.x, count, 3, 3).unwrap()).unwrap();
+        let start = Instant::now();
+        self.solver.get_number("mean_neighbours").unwrap();
+        start.elapsed().as_secs_f64()
+    }
+}
+
+#[divan::bench(args = [(50, 1), (50, 2)], sample_count = 20)]
+fn step(bencher: Bencher, (n, threads): (usize, usize)) {
+    let mut item = Item::new(n, threads);
+    item.step(10);
+    let items = ItemsCount::new(item.count());
+    bencher.counter(items).bench_local(|| item.solver.step(item.dt).unwrap());
+}
+
+#[divan::bench(args = [(50, 1), (50, 2)], sample_count = 5)]
+fn neighbours_and_weights(bencher: Bencher, (n, threads): (usize, usize)) {
+    let mut item = Item::new(n, threads);
+    bencher.counter(ItemsCount::new(item.count())).bench_local(|| item.set_up());
+}
+
+#[divan::bench(sample_count = 20)]
+fn memory_read(bencher: Bencher) {
+    let data = vec![1.0f64; 1 << 24];
+    bencher.counter(BytesCount::of_slice(&data)).bench_local(|| read(&data, 1));
+}
+
+/// Bytes per second of reading an array with so many threads.
+fn read(data: &[f64], threads: usize) -> f64 {
+    let start = Instant::now();
+    let sum = |part: &[f64]| {
+        let mut lanes = [0.0; 8];
+        part.chunks_exact(8).for_each(|c| lanes.iter_mut().zip(c).for_each(|(l, v)| *l += v));
+        lanes.iter().sum::<f64>()
+    };
+    let total: f64 = std::thread::scope(|s| {
+        let parts: Vec<_> = data.chunks(data.len().div_ceil(threads)).map(|part| s.spawn(move || sum(part))).collect();
+        parts.into_iter().map(|p| p.join().unwrap()).sum()
+    });
+    divan::black_box(total);
+    size_of_val(data) as f64 / start.elapsed().as_secs_f64()
+}
+
+fn median(mut values: Vec<f64>) -> f64 {
+    values.sort_by(f64::total_cmp);
+    values[values.len() / 2]
+}
+
+/// One row per size and number of threads; rivals in turn.
+fn table(sizes: &[usize]) {
+    println!(
+        "\n particles threads neighbours  ns/particle  ns/pair  scipy ns  ours/scipy  set-up/steps  B/particle  of read bandwidth"
+    );
+    let array = vec![1.0f64; 1 << 25];
+    for &n in sizes {
+        let rival = Scipy::new(n);
+        for threads in [1, 2] {
+            let mut item = Item::new(n, threads);
+            let neighbours = item.solver.get_number("mean_neighbours").unwrap();
+            let applications = (4_000_000 / item.count()).clamp(3, 200);
+            item.step(applications);
+            let (mut ours, mut theirs, mut bandwidth, mut setup) = (vec![], vec![], vec![], vec![]);
+            for round in 0..5 {
+                ours.push(item.step(applications));
+                bandwidth.push(read(&array, threads));
+                theirs.extend(rival.as_ref().filter(|_| threads == 1).and_then(|r| r.run(applications)));
+                if round < 3 {
+                    setup.push(item.set_up());
+                }
+            }
+            let per_step = median(ours);
+            let bytes = 10.0 * neighbours * item.count() as f64 / per_step;
+            let per = per_step / item.count() as f64 * 1e9;
+            let (scipy, ratio) = match theirs.is_empty() {
+                true => ("-".into(), "-".into()),
+                false => {
+                    let scipy = median(theirs) / item.count() as f64 * 1e9;
+                    (format!("{scipy:.1}"), format!("{:.2}", per / scipy))
+                }
+            };
+            println!(
+                "{:10} {threads:7} {neighbours:10.1} {per:12.1} {:8.2} {scipy:>9} {ratio:>11} {:13.1} {:11.0} {:17.0} %",
+                item.count(),
+                per / neighbours,
+                median(setup) / per_step,
+                item.solver.get_number("bytes").unwrap() / item.count() as f64,
+                100.0 * bytes / median(bandwidth)
+            );
+        }
+    }
+}
+
+/// scipy's sparse matrix on the same particles, in a process of its own that answers line by line.
+struct Scipy {
+    process: std::cell::RefCell<std::process::Child>,
+}
+
+impl Scipy {
+    fn new(n: usize) -> Option<Scipy> {
+        let python = std::env::var("DIFFUSPH_PYTHON").ok()?;
+        let script = concat!(env!("CARGO_MANIFEST_DIR"), "/benches/scipy_csr.py");
+        let file = std::env::temp_dir().join(format!("diffusph-bench-{}-{n}.f64", std::process::id()));
+        std::fs::write(&file, positions(n).iter().flat_map(|v| v.to_le_bytes()).collect::<Vec<u8>>()).ok()?;
+        let mut command = Command::new(python);
+        command.arg(script).arg(&file).arg(n.to_string()).env("OMP_NUM_THREADS", "1");
+        let child = command.stdin(std::process::Stdio::piped()).stdout(std::process::Stdio::piped()).spawn().ok()?;
+        Some(Scipy { process: child.into() })
+    }
+
+    fn run(&self, steps: usize) -> Option<f64> {
+        use std::io::{Read, Write};
+        let mut child = self.process.borrow_mut();
+        writeln!(child.stdin.as_mut()?, "{steps}").ok()?;
+        child.stdin.as_mut()?.flush().ok()?;
+        let mut line = String::new();
+        let mut byte = [0];
+        while child.stdout.as_mut()?.read(&mut byte).ok()? == 1 && byte[0] != b'\n' {
+            line.push(byte[0] as char);
+        }
+        line.trim().parse().ok()
+    }
+}
+
+impl Drop for Scipy {
+    fn drop(&mut self) {
+        let child = self.process.get_mut();
+        let _ = child.kill();
+        let _ = child.wait();
+    }
+}

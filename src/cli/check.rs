@@ -1,0 +1,127 @@
+//! `diffusph check`: what is in a particle file, and whether it can be used.
+
+use crate::array::Strided;
+use crate::error::{Error, Result};
+use crate::io::{self, Field, Snapshot};
+use crate::model::fields::{Access, FIELDS};
+use crate::pool::Pool;
+use crate::solver::Solver;
+use crate::space::rows::Rows;
+use crate::space::{Cloud, Domain, Scratch};
+use std::fmt::Write;
+use std::path::Path;
+
+/// Describes a file.
+///
+/// # Errors
+/// `Io`, `BadFile`; `BadElement` naming the first value that cannot be used.
+pub fn text(path: &Path) -> Result<String> {
+    let snapshot = io::read(path)?;
+    let dim = dimensions(&snapshot);
+    let mut text = String::new();
+    let time = snapshot.time.map_or(String::new(), |t| format!(", t = {t}"));
+    let _ = writeln!(text, "{}: {} particles, {dim}-D{time}", path.display(), snapshot.points.len());
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate().take(dim) {
+        let _ = writeln!(text, "  {name:<12}{}", Range::of(snapshot.points.iter().map(|p| p[axis])));
+    }
+    if let Some((least, mean)) = spacing(&snapshot, dim)? {
+        let note = if least == 0.0 { " (some share one place)" } else { "" };
+        let _ = writeln!(text, "  spacing     nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}");
+    }
+    for field in &snapshot.fields {
+        let _ = writeln!(text, "  {:<12}{}", field.name, describe(field));
+    }
+    for (name, note) in &snapshot.notes {
+        let _ = writeln!(text, "  note        {name}: {note}");
+    }
+    let mut solver = Solver::new(&format!("heat dim={dim} threads=1"))?;
+    solver.set_snapshot(&snapshot)?;
+    let _ = writeln!(text, "usable; {}", missing(&snapshot));
+    Ok(text)
+}
+
+/// 1 or 2 where the coordinates beyond are all the same.
+fn dimensions(snapshot: &Snapshot) -> usize {
+    let flat = |axis: usize| snapshot.points.windows(2).all(|p| p[0][axis] == p[1][axis]);
+    (1..=3).rev().find(|&dim| !flat(dim - 1)).unwrap_or(3)
+}
+
+fn describe(field: &Field) -> String {
+    let kind = format!("{} x {}", field.components, field.data.type_name());
+    let role = match FIELDS.iter().find(|f| f.name == field.name).map(|f| f.access) {
+        Some(Access::Input { .. }) => "taken",
+        _ => "left aside",
+    };
+    match field.data.to_f64() {
+        Ok(values) => format!("{kind:<12} {}, {role}", Range::of(values.into_iter())),
+        Err(_) => format!("{kind:<12} beyond doubles, {role}"),
+    }
+}
+
+/// What must still be given before it can run.
+fn missing(snapshot: &Snapshot) -> String {
+    let absent: Vec<&str> = ["m", "T", "kappa"].into_iter().filter(|name| snapshot.field(name).is_none()).collect();
+    match absent.is_empty() {
+        true => "nothing is missing".into(),
+        false => format!("still to be given in [set]: {}", absent.join(", ")),
+    }
+}
+
+struct Range {
+    low: f64,
+    high: f64,
+    odd: usize,
+}
+
+impl Range {
+    fn of(values: impl Iterator<Item = f64>) -> Range {
+        let start = Range { low: f64::INFINITY, high: f64::NEG_INFINITY, odd: 0 };
+        values.fold(start, |range, v| match v.is_finite() {
+            true => Range { low: range.low.min(v), high: range.high.max(v), ..range },
+            false => Range { odd: range.odd + 1, ..range },
+        })
+    }
+}
+
+impl std::fmt::Display for Range {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self.low <= self.high {
+            true => write!(f, "{} to {}", self.low, self.high)?,
+            false => write!(f, "no number")?,
+        }
+        if self.odd > 0 { write!(f, ", {} not finite", self.odd) } else { Ok(()) }
+    }
+}
+
+/// The least and the mean distance to the nearest neighbour, in open space; none without two particles.
+fn spacing(snapshot: &Snapshot, dim: usize) -> Result<Option<(f64, f64)>> {
+    let n = snapshot.points.len();
+    if n < 2 {
+        return Ok(None);
+    }
+    let x: Vec<f64> = snapshot.points.iter().flat_map(|p| p[..dim].iter().copied()).collect();
+    let x = Strided::new("x", &x, n, dim, dim)?;
+    x.check("x", "coordinates must be finite", f64::is_finite)?;
+    let pool = Pool::new(1)?;
+    let volume: f64 = (0..dim).map(|a| Range::of((0..n).map(|i| x.at(i, a)))).map(|r| r.high - r.low).product();
+    if volume == 0.0 {
+        return Ok(Some((0.0, 0.0))); // all in one place
+    }
+    let mut reach = 2.0 * (volume / n as f64).powf(1.0 / dim as f64);
+    let mut found = vec![f64::INFINITY; n];
+    // Particles without a neighbour yet are given a wider search.
+    while found.contains(&f64::INFINITY) {
+        let cloud = Cloud::sort(&Domain::open(dim), x, reach, &pool)?;
+        let h = vec![reach; n];
+        let rows = Rows::new(&cloud, &h, 1.0, &pool)?;
+        rows.visit(0..n, &mut Scratch::default(), |row| {
+            found[row.i] = row.r.iter().copied().fold(f64::INFINITY, f64::min);
+        })?;
+        reach *= 2.0;
+        if !reach.is_finite() {
+            return Err(Error::bad("x", "too far apart", "no neighbour can be found"));
+        }
+    }
+    let least = found.iter().copied().fold(f64::INFINITY, f64::min);
+    Ok(Some((least, found.iter().sum::<f64>() / n as f64)))
+}

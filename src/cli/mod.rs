@@ -1,0 +1,137 @@
+//! The program: what it is asked, what it answers, and how it ends.
+//!
+//! Exit codes: 0 done; 1 it failed (a file, the numbers, the machine); 2 it was asked something that it cannot mean
+//! (a word, a key, an argument); 130 it was interrupted.
+
+mod check;
+mod interrupt;
+mod list;
+mod progress;
+
+use crate::error::{Error, Result};
+use crate::study::run::Study;
+use crate::study::scene::Scene;
+use clap::{Args, Parser, Subcommand};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+/// Diffusion on SPH particles: runs scenes, shows what a run will do, lists what can be chosen, looks into files.
+#[derive(Parser)]
+#[command(name = "diffusph", version, arg_required_else_help = true)]
+#[command(after_help = "Start with 'diffusph run': it needs no file, and leaves a series for ParaView.")]
+struct Program {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand)]
+enum Command {
+    /// Run a scene and report its accuracy against its run time
+    #[command(after_help = "Snapshots appear whole or not at all; Ctrl-C leaves a series that can be read.")]
+    Run {
+        #[command(flatten)]
+        scene: SceneArgs,
+        /// Report as JSON
+        #[arg(long)]
+        json: bool,
+        /// Folder under which the scene's output goes
+        #[arg(long, value_name = "DIR", default_value = ".")]
+        out: PathBuf,
+    },
+    /// Show what a run of a scene will do, and what it leaves out and why
+    Plan {
+        #[command(flatten)]
+        scene: SceneArgs,
+    },
+    /// List what can be chosen: kernels, operators, integrators, fields, … ; without a name, all lists
+    #[command(
+        after_help = "'list scene' shows every key of a scene file, 'list demo' a scene to start from, 'list exact' every exact solution."
+    )]
+    List {
+        /// Which list
+        name: Option<String>,
+    },
+    /// Show what is in a particle file, and whether it can be used
+    Check {
+        /// A .vtu, .vtp, .pvtu, .pvtp or legacy .vtk file
+        file: PathBuf,
+    },
+}
+
+#[derive(Args)]
+struct SceneArgs {
+    /// Scene file ('list scene' shows its keys); without one, a scene that comes with the program
+    scene: Option<PathBuf>,
+    /// Replace or add words of the scene: --set "kernel=M4 operator=kernel"; may be repeated
+    #[arg(long, value_name = "WORDS")]
+    set: Vec<String>,
+}
+
+/// The scene that comes with the program.
+const DEFAULT_SCENE: &str = include_str!("default.toml");
+
+impl SceneArgs {
+    fn study(&self) -> Result<Study> {
+        let mut scene = match &self.scene {
+            Some(path) => Scene::read(path)?,
+            None => Scene::parse("the default scene", DEFAULT_SCENE)?,
+        };
+        for word in self.set.iter().flat_map(|words| words.split_whitespace()) {
+            scene.set_word(word)?;
+        }
+        let folder = self.scene.as_deref().and_then(Path::parent);
+        Study::new(scene, folder.unwrap_or(Path::new("")))
+    }
+}
+
+/// Runs the program with the arguments of the process.
+pub fn main() -> ExitCode {
+    let done = match Program::parse().command {
+        Command::Run { scene, json, out } => run(&scene, json, &out),
+        Command::Plan { scene } => scene.study().and_then(|mut study| print(study.plan()?.to_string())),
+        Command::List { name } => list::text(name.as_deref()).and_then(print),
+        Command::Check { file } => check::text(&file).and_then(print),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(error) => {
+            let message = match error {
+                Error::Cancelled => "interrupted; the snapshots listed so far are complete".to_string(),
+                _ => error.to_string(),
+            };
+            // Nobody is left to be told when standard error is closed too.
+            let _ = writeln!(std::io::stderr(), "diffusph: {message}");
+            ExitCode::from(exit_code(&error))
+        }
+    }
+}
+
+fn run(args: &SceneArgs, json: bool, out: &Path) -> Result<()> {
+    let study = args.study()?;
+    interrupt::listen();
+    let report = study.run(out, progress::watch())?;
+    if json {
+        let text = serde_json::to_string_pretty(&report).map_err(|e| Error::bad("--json", e, "report this, please"))?;
+        return print(text + "\n");
+    }
+    print(report.to_string())
+}
+
+/// To standard output. A reader that has seen enough, like `head`, is no failure.
+fn print(text: String) -> Result<()> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(Error::Io { path: "standard output".into(), reason: e.to_string() })
+        }
+        _ => Ok(()),
+    }
+}
+
+fn exit_code(error: &Error) -> u8 {
+    match error {
+        Error::Cancelled => 130,
+        Error::BadValue { .. } | Error::UnknownWord { .. } | Error::OutOfOrder { .. } | Error::WrongCount { .. } => 2,
+        _ => 1,
+    }
+}

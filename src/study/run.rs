@@ -1,0 +1,182 @@
+//! The run of a scene: steps, snapshots, and what they took.
+
+use super::exact::Exact;
+use super::report::{Accuracy, Energy, LeftOut, Report, Seconds, Temperature, Work};
+use super::scene::{Output, Scene};
+use super::setup::{at_all, setup};
+use crate::error::{Error, Result};
+use crate::io::Series;
+use crate::plan::Plan;
+use crate::solver::Solver;
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+/// Inputs that let energy in or out.
+const DOORS: &[&str] = &["fixed", "source", "flux_in", "h_conv", "emissivity"];
+
+/// Called with the share that is done; false stops the run.
+pub type Watch = Box<dyn FnMut(f64) -> bool + Send>;
+
+/// A scene that is ready to run.
+pub struct Study {
+    scene: Scene,
+    solver: Solver,
+    exact: Option<Exact>,
+    setup_seconds: f64,
+}
+
+impl Study {
+    /// Makes the particles of a scene; its files lie in `folder`.
+    ///
+    /// # Errors
+    /// Whatever is wrong with the scene or its files.
+    pub fn new(scene: Scene, folder: &Path) -> Result<Study> {
+        let start = Instant::now();
+        let (solver, exact) = setup(&scene, folder)?;
+        Ok(Study { scene, solver, exact, setup_seconds: start.elapsed().as_secs_f64() })
+    }
+
+    /// What a step will do.
+    ///
+    /// # Errors
+    /// As [`Solver::plan`].
+    pub fn plan(&mut self) -> Result<Plan> {
+        self.solver.plan()
+    }
+
+    /// Steps to the end, with snapshots under `out`.
+    ///
+    /// # Errors
+    /// As [`Solver::step`]; `Io`; `Cancelled` when `watch` says so. Snapshots written until then are complete.
+    pub fn run(mut self, out: &Path, watch: Watch) -> Result<Report> {
+        let callback = told(self.scene.time.start, self.scene.time.end, watch);
+        self.solver.set_progress_callback(Some(callback));
+        let isolated = is_isolated(&mut self.solver)?;
+        let (energy, temperature) = (self.solver.get_number("energy")?, extrema(&mut self.solver)?);
+        let mut writer = self.scene.output.as_ref().map(|output| Writer::new(output, out)).transpose()?;
+        let work = self.steps(writer.as_mut())?;
+
+        let solver = &mut self.solver;
+        let accuracy = self.exact.as_ref().map(|exact| accuracy(&self.scene, solver, exact)).transpose()?;
+        let (n, neighbours) = (solver.len() as f64, solver.get_number("mean_neighbours")?);
+        let seconds = Seconds {
+            setup: self.setup_seconds,
+            solve: work.seconds,
+            files: writer.as_ref().map_or(0.0, |w| w.seconds),
+            passes: solver.spent().0.into_iter().map(|(name, s)| (name.to_string(), s)).collect(),
+        };
+        let left_out = solver.plan()?.left_out.into_iter();
+        Ok(Report {
+            title: self.scene.title,
+            words: solver.words().to_string(),
+            particles: solver.len(),
+            dim: solver.dim(),
+            neighbours,
+            threads: solver.get_number("threads")? as usize,
+            bytes: solver.get_number("bytes")?,
+            time: solver.get_number("time")?,
+            accuracy,
+            energy: Energy::new(energy, solver.get_number("energy")?, absolute_energy(solver)?, isolated),
+            temperature_before: temperature,
+            temperature: extrema(solver)?,
+            ns_per_particle: seconds.per_application(&work, n),
+            ns_per_pair: seconds.per_application(&work, n * neighbours),
+            work,
+            seconds,
+            left_out: left_out
+                .map(|r| LeftOut { rule: r.name, reason: r.reason, result: r.same.to_string() })
+                .collect(),
+            series: writer.as_ref().map(|w| w.pvd.display().to_string()),
+            snapshots: writer.map_or(0, |w| w.count),
+        })
+    }
+
+    fn steps(&mut self, mut writer: Option<&mut Writer>) -> Result<Work> {
+        let (solver, time) = (&mut self.solver, &self.scene.time);
+        let mut work = Work::default();
+        let mut write = |solver: &mut Solver, step| match &mut writer {
+            Some(writer) => writer.write(solver, step, time.steps),
+            None => Ok(()),
+        };
+        write(solver, 0)?;
+        for step in 1..=time.steps {
+            // From the ends rather than by adding up, so that the last step arrives at the end.
+            let next = time.start + (time.end - time.start) * f64::from(step) / f64::from(time.steps);
+            let now = solver.get_number("time")?;
+            work.add(&solver.step(next - now)?);
+            write(solver, step)?;
+        }
+        Ok(work)
+    }
+}
+
+/// From the solver's callback, which is told the time, to the share of the whole.
+fn told(start: f64, end: f64, mut watch: Watch) -> crate::plan::state::Progress {
+    Box::new(move |time, _| i32::from(!watch(((time - start) / (end - start)).clamp(0.0, 1.0))))
+}
+
+fn is_isolated(solver: &mut Solver) -> Result<bool> {
+    for door in DOORS {
+        if solver.get_all(door)?.iter().any(|v| *v != 0.0) {
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Σ |m c_v T|: what a change of energy is small against.
+fn absolute_energy(solver: &mut Solver) -> Result<f64> {
+    let (m, u) = (solver.get_all("m")?, solver.get_all("u")?);
+    Ok(m.iter().zip(u).map(|(m, u)| (m * u).abs()).sum())
+}
+
+fn extrema(solver: &mut Solver) -> Result<Temperature> {
+    Ok(Temperature { min: solver.get_number("T_min")?, max: solver.get_number("T_max")? })
+}
+
+/// The error of T where T is not fixed.
+fn accuracy(scene: &Scene, solver: &mut Solver, exact: &Exact) -> Result<Accuracy> {
+    let (dim, time) = (solver.dim(), solver.get_number("time")?);
+    let known = at_all(exact, &solver.get_all("x")?, dim, time);
+    let (t, fixed) = (solver.get_all("T")?, solver.get_all("fixed")?);
+    let free = t.iter().zip(&known).zip(&fixed).filter(|(_, fixed)| **fixed == 0.0).map(|((t, known), _)| (*t, *known));
+    let solution = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
+    Ok(Accuracy::new(solution, &free.collect::<Vec<_>>()))
+}
+
+/// Writes the series.
+struct Writer {
+    output: Output,
+    pvd: PathBuf,
+    series: Series,
+    count: usize,
+    seconds: f64,
+}
+
+impl Writer {
+    fn new(output: &Output, out: &Path) -> Result<Writer> {
+        let pvd = out.join(&output.pvd);
+        let folder = pvd.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+        let failed =
+            |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+        let series = Series::open_or_create(&pvd)?;
+        Ok(Writer { output: output.clone(), pvd, series, count: 0, seconds: 0.0 })
+    }
+
+    /// Every so many steps, and at the end.
+    fn write(&mut self, solver: &mut Solver, step: u32, last: u32) -> Result<()> {
+        if u64::from(step) % self.output.every != 0 && step != last {
+            return Ok(());
+        }
+        let start = Instant::now();
+        let stem = self.pvd.file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned());
+        let file = self.pvd.with_file_name(format!("{stem}_{:04}.vtu", self.count));
+        let extra: Vec<&str> = self.output.fields.iter().map(String::as_str).collect();
+        solver.write_vtk_with(&file, self.output.encoding.into(), &extra)?;
+        self.series.append(solver.get_number("time")?, &file)?;
+        self.count += 1;
+        self.seconds += start.elapsed().as_secs_f64();
+        Ok(())
+    }
+}

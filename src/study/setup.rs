@@ -1,0 +1,281 @@
+//! From a scene to a solver: particles, quantities, marks.
+
+use super::exact::{self, Exact};
+use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
+use super::{choose, lattice, surface};
+use crate::array::Strided;
+use crate::error::{Error, Result};
+use crate::io::{self, Snapshot};
+use crate::model::conductivity::LAWS;
+use crate::model::fields::{self, NUMBERS};
+use crate::solver::Solver;
+use crate::space::Domain;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
+    let solver = Solver::new(&scene.words)?;
+    let mut setup = Setup { scene, snapshot: None, exact: None, x: Vec::new(), cell: None, solver };
+    known(scene.set.keys().chain(scene.mark.iter().flat_map(|mark| mark.set.keys())))?;
+    setup.space()?;
+    setup.particles(folder)?;
+    setup.exact = setup.find_exact()?;
+    setup.solver.set_number("time", scene.time.start)?;
+    setup.quantities()?;
+    for mark in &scene.mark {
+        setup.weigh()?;
+        let chosen = setup.chosen(&mark.place)?;
+        for (name, value) in &mark.set {
+            setup.mark(name, value, &chosen)?;
+        }
+    }
+    setup.weigh()?;
+    Ok((setup.solver, setup.exact))
+}
+
+/// Every name is that of a quantity that can be set.
+fn known<'a>(names: impl Iterator<Item = &'a String>) -> Result<()> {
+    let mut others = names.filter(|name| !NUMBERS.iter().any(|n| n.name == name.as_str()));
+    others.try_for_each(|name| fields::slot(name).map(drop))
+}
+
+struct Setup<'a> {
+    scene: &'a Scene,
+    snapshot: Option<Snapshot>,
+    exact: Option<Exact>,
+    /// `dim` coordinates per particle, as they were given.
+    x: Vec<f64>,
+    /// Volume of a particle of a lattice.
+    cell: Option<f64>,
+    solver: Solver,
+}
+
+impl Setup<'_> {
+    fn space(&mut self) -> Result<()> {
+        match &self.scene.space {
+            Some(space) => self.solver.set_box(&space.lo, &space.hi, &self.periodic()),
+            None => Ok(()),
+        }
+    }
+
+    fn periodic(&self) -> Vec<bool> {
+        match self.scene.space.as_ref().map(|s| &s.periodic) {
+            Some(Periodic::Each(each)) => each.clone(),
+            Some(Periodic::All(all)) => vec![*all; self.solver.dim()],
+            None => vec![false; self.solver.dim()],
+        }
+    }
+
+    fn domain(&self) -> Result<Domain> {
+        let open = || Ok(Domain::open(self.solver.dim()));
+        self.scene.space.as_ref().map_or_else(open, |s| Domain::new(&s.lo, &s.hi, &self.periodic()))
+    }
+
+    /// (m/rho)^(1/nu)
+    fn spacing(&mut self) -> Result<Vec<f64>> {
+        let power = 1.0 / self.solver.dim() as f64;
+        let (m, rho) = (self.solver.get_all("m")?, self.solver.get_all("rho")?);
+        Ok(m.iter().zip(rho).map(|(m, rho)| (m / rho).powf(power)).collect())
+    }
+
+    fn particles(&mut self, folder: &Path) -> Result<()> {
+        let dim = self.solver.dim();
+        let Particles { file, lattice: name, n, jitter, seed } = &self.scene.particles;
+        if let Some(file) = file {
+            let snapshot = io::read(folder.join(file))?;
+            self.solver.set_snapshot(&snapshot)?;
+            self.x = snapshot.points.iter().flat_map(|p| p[..dim].iter().copied()).collect();
+            self.snapshot = Some(snapshot);
+        } else if let (Some(name), Some(n), Some(space)) = (name, n, &self.scene.space) {
+            self.x = lattice::find(name, dim)?.fill(&space.lo, &space.hi, *n as usize)?;
+            let volume: f64 = space.lo.iter().zip(&space.hi).map(|(lo, hi)| hi - lo).product();
+            let cell = volume * dim as f64 / self.x.len() as f64;
+            lattice::jitter(&mut self.x, jitter * cell.powf(1.0 / dim as f64), *seed);
+            self.solver.set_particles(Strided::new("x", &self.x, self.x.len() / dim, dim, dim)?)?;
+            self.cell = Some(cell);
+        }
+        Ok(())
+    }
+
+    fn find_exact(&self) -> Result<Option<Exact>> {
+        let Some(wanted) = &self.scene.exact else { return Ok(None) };
+        let numbers = |numbers: &Numbers| match numbers {
+            Numbers::One(one) => vec![*one],
+            Numbers::List(list) => list.clone(),
+        };
+        let given = wanted.parameters.iter().map(|(name, values)| (name.clone(), numbers(values))).collect();
+        let number = |(name, value): (&String, &Value)| match value {
+            Value::Number(v) => Some((name.clone(), *v)),
+            _ => None,
+        };
+        let material: BTreeMap<String, f64> = self.scene.set.iter().filter_map(number).collect();
+        exact::find(&wanted.name, self.solver.dim(), given, &material).map(Some)
+    }
+
+    fn quantities(&mut self) -> Result<()> {
+        let set = &self.scene.set;
+        if self.cell.is_some() && !set.contains_key("rho") {
+            self.solver.set_number("rho", 1.0)?;
+        }
+        for (name, value) in set {
+            match value {
+                Value::Number(v) => self.solver.set_number(name, *v)?,
+                Value::Flag(on) => self.solver.set_number(name, f64::from(*on))?,
+                Value::Text(text) if is_law(name, text) => self.solver.set_law(name, text)?,
+                Value::Text(text) => {
+                    let values = self.array(name, text)?;
+                    self.solver.set(name, Strided::packed(&values))?;
+                }
+            }
+        }
+        if self.exact.is_some() && !set.contains_key("T") {
+            let values = self.array("T", "exact")?;
+            self.solver.set("T", Strided::packed(&values))?;
+        }
+        Ok(())
+    }
+
+    /// The masses of a lattice, rho times the volume of a particle, unless the scene sets them.
+    fn weigh(&mut self) -> Result<()> {
+        let Some(cell) = self.cell.filter(|_| !self.scene.set.contains_key("m")) else { return Ok(()) };
+        match self.scene.set.get("rho") {
+            // rho as an array of the solver is there only once masses are: start from any.
+            _ if self.rho_varies() => {
+                self.solver.set_number("m", cell)?;
+                let m: Vec<f64> = self.solver.get_all("rho")?.iter().map(|rho| rho * cell).collect();
+                self.solver.set("m", Strided::packed(&m))
+            }
+            Some(Value::Number(rho)) => self.solver.set_number("m", rho * cell),
+            _ => self.solver.set_number("m", cell),
+        }
+    }
+
+    fn rho_varies(&self) -> bool {
+        let text = matches!(self.scene.set.get("rho"), Some(Value::Text(_)));
+        text || self.scene.mark.iter().any(|mark| mark.set.contains_key("rho"))
+    }
+
+    /// What a text stands for, per particle: the exact solution at the start, or an array of the file.
+    fn array(&self, name: &str, text: &str) -> Result<Vec<f64>> {
+        if let Some(exact) = self.exact.as_ref().filter(|_| text == "exact") {
+            return Ok(at_all(exact, &self.x, self.solver.dim(), self.scene.time.start));
+        }
+        let fields = || self.snapshot.iter().flat_map(|s| &s.fields);
+        let field = fields().find(|f| f.name == text).ok_or_else(|| {
+            let known: Vec<&str> =
+                fields().map(|f| f.name.as_str()).chain(self.exact.iter().map(|_| "exact")).collect();
+            Error::unknown(&format!("array for {name}"), text, known)
+        })?;
+        if field.components != 1 {
+            return Err(Error::bad(text, format!("{} components", field.components), "a quantity needs one"));
+        }
+        field.data.to_f64()
+    }
+
+    /// Sets a quantity of the chosen particles and leaves it as it is on the others.
+    fn mark(&mut self, name: &str, value: &Value, chosen: &[bool]) -> Result<()> {
+        let new = match value {
+            Value::Number(v) => vec![*v; chosen.len()],
+            Value::Flag(on) => vec![f64::from(*on); chosen.len()],
+            Value::Text(text) if is_law(name, text) => {
+                return Err(Error::bad(name, format!("'{text}'"), "a law is for all particles: put it in [set]"));
+            }
+            Value::Text(text) => self.array(name, text)?,
+        };
+        let mut values = self.solver.get_all(name)?;
+        values.iter_mut().zip(&new).zip(chosen).filter(|(_, chosen)| **chosen).for_each(|((v, new), _)| *v = *new);
+        self.solver.set(name, Strided::packed(&values))
+    }
+
+    fn chosen(&mut self, place: &Where) -> Result<Vec<bool>> {
+        let mut chosen = choose::by_place(place, self.scene.space.as_ref(), &self.x, self.solver.dim())?;
+        let mut keep = |holds: &dyn Fn(usize) -> bool| {
+            chosen.iter_mut().enumerate().for_each(|(i, chosen)| *chosen &= holds(i));
+        };
+        match (&place.field, place.equals) {
+            (Some(field), Some(value)) => {
+                let values = self.array("where", field)?;
+                keep(&|i| values[i] == value);
+            }
+            (None, None) => {}
+            _ => return Err(Error::bad("where", "incomplete", "field and equals go together")),
+        }
+        if let Some(wanted) = place.surface {
+            let spacing = self.spacing()?;
+            let free = surface::free(&self.domain()?, &self.x, &spacing)?;
+            keep(&|i| free[i] == wanted);
+        }
+        Ok(chosen)
+    }
+}
+
+/// An exact solution at every particle.
+pub fn at_all(exact: &Exact, x: &[f64], dim: usize, t: f64) -> Vec<f64> {
+    let place = |p: &[f64]| std::array::from_fn(|a| p.get(a).copied().unwrap_or(0.0));
+    x.chunks(dim).map(|p| exact(place(p), t)).collect()
+}
+
+fn is_law(name: &str, text: &str) -> bool {
+    let first = text.split_whitespace().next();
+    name == "kappa" && LAWS.iter().any(|(law, _)| Some(*law) == first)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scene(more: &str) -> Scene {
+        let text = format!(
+            "words = \"heat dim=2 threads=1\"\n[box]\nlo = [0, 0]\nhi = [2, 1]\n[particles]\nlattice = \"square\"\nn = 20\n\
+             [set]\nT = 1\nkappa = 2\nrho = 3\n[time]\nend = 1\n{more}"
+        );
+        Scene::parse("test", &text).unwrap()
+    }
+
+    fn solver(more: &str) -> Result<Solver> {
+        setup(&scene(more), Path::new(".")).map(|(solver, _)| solver)
+    }
+
+    #[test]
+    fn masses_fill_the_box_and_follow_rho() {
+        let mut s = solver("").unwrap();
+        assert_eq!(s.len(), 200);
+        assert!((s.get_all("m").unwrap().iter().sum::<f64>() - 6.0).abs() < 1e-12);
+        let mut s = solver("[[mark]]\nwhere = { x = [1, 2] }\nset = { rho = 5, kappa = 7 }").unwrap();
+        let (m, kappa) = (s.get_all("m").unwrap(), s.get_all("kappa").unwrap());
+        assert!((m.iter().sum::<f64>() - 8.0).abs() < 1e-12);
+        assert_eq!(kappa.iter().filter(|k| **k == 7.0).count(), 100);
+    }
+
+    #[test]
+    fn conditions_choose_together() {
+        let fixed = |place: &str| -> usize {
+            let mut s = solver(&format!("[[mark]]\nwhere = {place}\nset = {{ fixed = true }}")).unwrap();
+            s.get_all("fixed").unwrap().iter().filter(|f| **f != 0.0).count()
+        };
+        assert_eq!(fixed("{}"), 200);
+        assert_eq!(fixed("{ x = [0, 0.5], y = [0.5, 1] }"), 25);
+        assert_eq!(fixed("{ r = [0, 0.11], centre = [1, 0.5] }"), 4);
+        // Away from the corners, the lowest and the highest row.
+        assert_eq!(fixed("{ surface = true, x = [0.5, 1.5] }"), 20);
+        assert_eq!(fixed("{ surface = false, x = [0.5, 1.5] }"), 80);
+    }
+
+    #[test]
+    fn what_a_scene_cannot_mean_is_said() {
+        for (more, expected) in [
+            ("[[mark]]\nwhere = {}\nset = { kapa = 1 }", "did you mean 'kappa'"),
+            ("[[mark]]\nwhere = {}\nset = { grad_T = 1 }", "computed"),
+            ("[[mark]]\nwhere = { z = [0, 1] }\nset = { T = 1 }", "dim=2"),
+            ("[[mark]]\nwhere = { field = \"type\" }\nset = { T = 1 }", "go together"),
+            ("[[mark]]\nwhere = {}\nset = { kappa = -1 }", "kappa[0] is -1"),
+            ("[[mark]]\nwhere = {}\nset = { kappa = \"power n=2\" }", "for all particles"),
+            ("[[mark]]\nwhere = {}\nset = { T = \"teperature\" }", "unknown array for T"),
+            ("[exact]\nname = \"sin\"", "did you mean 'sine'"),
+            ("[exact]\nname = \"sine\"", "waves of sine is missing"),
+        ] {
+            let text = solver(more).err().map(|e| e.to_string()).unwrap_or_default();
+            assert!(text.contains(expected), "{more}: {text}");
+        }
+    }
+}

@@ -1,0 +1,78 @@
+//! Which particles are at a free surface: those whose neighbours all lie to one side.
+//!
+//! The measure is the length of the mean direction to the neighbours within about three spacings. It is 0 in a lattice and
+//! 2/π or 1/2 at a flat surface in 2 or 3 dimensions; inside disordered particles it stays below 0.2, since close
+//! pairs count no more than others. (The operator's first moment, whose weights grow for close pairs, does not tell a
+//! strongly disordered interior from a surface.)
+
+use crate::array::Strided;
+use crate::error::Result;
+use crate::memory;
+use crate::pool::Pool;
+use crate::space::rows::Rows;
+use crate::space::{Cloud, Domain, Row, Scratch};
+
+/// Longer mean directions mean a surface, in 1, 2 and 3 dimensions. The first and second layers of a square lattice have
+/// 1 and 0.33, 0.54 and 0.22, 0.38 and 0.14.
+const THRESHOLD: [f64; 3] = [0.6, 0.3, 0.25];
+
+/// Reach of the search, in spacings: between two shells of a lattice.
+const REACH: f64 = 2.9;
+
+/// Whether each particle is at a surface; `spacing` is (m/rho)^(1/nu) of each.
+///
+/// # Errors
+/// `NoMemory`; `BoxTooSmall` where that reaches too many periodic images.
+pub fn free(domain: &Domain, x: &[f64], spacing: &[f64]) -> Result<Vec<bool>> {
+    let (n, dim, pool) = (spacing.len(), domain.dim, Pool::new(1)?);
+    let most = REACH * spacing.iter().copied().fold(0.0, f64::max);
+    let cloud = Cloud::sort(domain, Strided::new("x", x, n, dim, dim)?, most, &pool)?;
+    let reach = memory::collected("reach", cloud.host.iter().map(|&host| REACH * spacing[host as usize]))?;
+    let rows = Rows::new(&cloud, &reach, 1.0, &pool)?;
+    let mut free = memory::filled("surface", n, false)?;
+    rows.visit(0..n, &mut Scratch::default(), |row| {
+        free[cloud.host[row.i] as usize] = one_sidedness(&row, reach[row.i]) > THRESHOLD[dim - 1];
+    })?;
+    Ok(free)
+}
+
+/// The length of the mean direction to the neighbours within `reach`; 1 for a particle that has none.
+fn one_sidedness(row: &Row, reach: f64) -> f64 {
+    let (mut sum, mut count) = ([0.0; 3], 0);
+    for (k, &r) in row.r.iter().enumerate().filter(|(_, r)| **r > 0.0 && **r < reach) {
+        sum.iter_mut().zip(row.d).filter(|(_, d)| !d.is_empty()).for_each(|(sum, d)| *sum += d[k] / r);
+        count += 1;
+    }
+    if count == 0 { 1.0 } else { sum.iter().map(|s| s * s).sum::<f64>().sqrt() / f64::from(count) }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::lattice::{find, jitter};
+    use super::*;
+
+    #[test]
+    fn a_disordered_block_has_its_outermost_layer_as_surface() {
+        for (dim, name, n) in [(1, "cubic", 40), (2, "square", 40), (3, "cubic", 14)] {
+            for disorder in [0.0, 0.15, 0.3] {
+                let (lo, hi) = (&[0.0; 3][..dim], &[1.0; 3][..dim]);
+                let mut x = find(name, dim).unwrap().fill(lo, hi, n).unwrap();
+                let layer = |p: &[f64]| ((p[0].min(1.0 - p[0])) * n as f64) as usize;
+                let layers: Vec<usize> = x.chunks(dim).map(layer).collect();
+                let d = 1.0 / n as f64;
+                jitter(&mut x, disorder * d, 3);
+                // Open along x only.
+                let periodic: Vec<bool> = (0..dim).map(|a| a > 0).collect();
+                let domain = Domain::new(lo, hi, &periodic).unwrap();
+                let free = free(&domain, &x, &vec![d; layers.len()]).unwrap();
+                for (layer, free) in layers.iter().zip(free) {
+                    // The second layer of a strongly disordered block has gaps above it.
+                    assert!(
+                        (*layer == 1 && disorder > 0.2) || free == (*layer == 0),
+                        "{dim}-D, disorder {disorder}, layer {layer}"
+                    );
+                }
+            }
+        }
+    }
+}

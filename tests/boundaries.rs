@@ -1,0 +1,342 @@
+//! Boundaries, sources and laws of conductivity, each against an exact steady or transient solution.
+
+mod particles;
+
+use diffusph::study::exact::slab::{Cooling, Slab};
+use diffusph::study::exact::space::{Barenblatt, Contact};
+use diffusph::study::exact::steady::{Layers, Shell, radiative_cooling};
+use diffusph::{Solver, Strided};
+use particles::*;
+
+const SLAB: Slab = Slab { a: 0.0, b: 1.0, kappa: 1.0, capacity: 1.0 };
+
+/// A row of n particles of spacing 1/n, and `outside` more on each side.
+fn row(n: usize, outside: usize) -> Vec<f64> {
+    let first = -(outside as f64);
+    (0..n + 2 * outside).map(|i| (first + i as f64 + 0.5) / n as f64).collect()
+}
+
+/// kappa = rho = c_v = 1 on such a row.
+fn slab(words: &str, x: &[f64], n: usize) -> Solver {
+    let mut s = unit_box(words, x, 1, false);
+    s.set_number("m", 1.0 / n as f64).unwrap();
+    s.set_number("T", 0.0).unwrap();
+    s
+}
+
+/// Mean of |a − b|, b a function of x.
+fn error(x: &[f64], t: &[f64], exact: impl Fn(f64) -> f64) -> f64 {
+    x.iter().zip(t).map(|(x, t)| (t - exact(*x)).abs()).sum::<f64>() / x.len() as f64
+}
+
+/// Halving the spacing halves (at least: 1.7) the error, and the error is at most `coefficient` spacings.
+fn first_order(coefficient: f64, error: impl Fn(usize) -> f64) {
+    let (coarse, fine) = (error(40), error(80));
+    assert!(fine < coarse / 1.7 && fine < coefficient / 80.0, "{coarse:e} {fine:e}");
+}
+
+#[test]
+fn fixed_temperatures_and_a_source_give_a_parabola() {
+    for (operator, source) in [("brookshaw", 0.0), ("kernel", 0.0), ("brookshaw", 8.0), ("kernel", 8.0)] {
+        let (n, outside) = (40, 8);
+        let x = row(n, outside);
+        let exact = |x: f64| SLAB.between([1.0, 3.0], source, x);
+        let mut s = slab(&format!("operator={operator}"), &x, n);
+        let fixed = field(&x, 1, |p| f64::from(!(0.0..=1.0).contains(&p[0])));
+        set(&mut s, "fixed", &fixed);
+        s.set_number("source", source).unwrap();
+        // Held particles have the exact values; inside, the start is far from them.
+        set(&mut s, "T", &x.iter().zip(&fixed).map(|(&x, &f)| f * exact(x)).collect::<Vec<_>>());
+        s.step(20.0).unwrap();
+        // On a lattice the normalised operator is exact for parabolas; e^(-pi² 20) of the start is left.
+        let t = s.get_all("T").unwrap();
+        let worst = x.iter().zip(&t).map(|(&x, t)| (t - exact(x)).abs()).fold(0.0, f64::max);
+        assert!(worst < 1e-10, "{operator} {source}: {worst:e}");
+        assert_eq!(s.get_all("dT_dt").unwrap()[0], 0.0);
+    }
+}
+
+#[test]
+fn two_layers_carry_one_flux() {
+    for ratio in [10.0, 1e3, 1e6] {
+        let (n, outside) = (100, 8);
+        let x = row(n, outside);
+        let layers = Layers { x: [0.0, 0.5, 1.0], kappa: [1.0, ratio], temperature: [1.0, 0.0] };
+        let mut s = slab("kernel=M4", &x, n);
+        set(&mut s, "fixed", &field(&x, 1, |p| f64::from(!(0.0..=1.0).contains(&p[0]))));
+        set(&mut s, "kappa", &field(&x, 1, |p| if p[0] < 0.5 { 1.0 } else { ratio }));
+        // Start from the answer on the fast side: only the slow side has to relax, in 0.5²/pi² = 0.025.
+        set(&mut s, "T", &field(&x, 1, |p| if p[0] < 0.0 || p[0] > 0.5 { layers.at(p[0]) } else { 0.5 }));
+        let end = if ratio > 1e4 { 0.0 } else { 0.5 };
+        s.step(end).unwrap();
+        if end > 0.0 {
+            let error = error(&x, &s.get_all("T").unwrap(), |x| layers.at(x));
+            // First order in the spacing at the jump: a hundredth of ΔT times a tenth.
+            assert!(error < 1e-3, "{ratio}: {error:e}");
+        }
+        // The steady state is left alone: its rate is small against that of the arithmetic mean.
+        let residual = |mean: &str| {
+            let mut s = slab(&format!("kernel=M4 mean={mean}"), &x, n);
+            set(&mut s, "kappa", &field(&x, 1, |p| if p[0] < 0.5 { 1.0 } else { ratio }));
+            set(&mut s, "T", &field(&x, 1, |p| layers.at(p[0])));
+            max_abs(&s.get_all("rate").unwrap()[outside..n + outside])
+        };
+        assert!(residual("harmonic") * 3.0 < residual("arithmetic"), "{ratio}");
+    }
+}
+
+#[test]
+fn no_conductivity_insulates() {
+    let x = row(60, 0);
+    let mut s = slab("kernel=M4 integrator=euler", &x, 60);
+    set(&mut s, "kappa", &field(&x, 1, |p| if (0.4..0.6).contains(&p[0]) { 0.0 } else { 1.0 }));
+    set(&mut s, "T", &field(&x, 1, |p| if p[0] < 0.2 { 5.0 } else { 1.0 }));
+    let left = |t: &[f64]| t[..24].iter().sum::<f64>();
+    let before = s.get_all("T").unwrap();
+    s.step(10.0).unwrap();
+    let t = s.get_all("T").unwrap();
+    assert!((left(&t) / left(&before) - 1.0).abs() < 1e-12 && t[36..].iter().all(|&t| t == 1.0), "{t:?}");
+    assert!((t[0] - t[23]).abs() < 1e-6 && t[23] > 2.9);
+
+    s.set_number("kappa", 0.0).unwrap();
+    assert_eq!(s.limit().unwrap(), f64::INFINITY);
+    s.step(1e9).unwrap();
+    assert_eq!(bits(&s.get_all("T").unwrap()), bits(&t));
+}
+
+#[test]
+fn a_flux_heats_a_slab() {
+    let (q, end) = (2.0, 0.2);
+    first_order(1.5, |n| {
+        let x = row(n, 0);
+        let mut s = slab("kernel=M6", &x, n);
+        set(&mut s, "flux_in", &field(&x, 1, |p| if p[0] > 1.0 - 1.0 / n as f64 { q } else { 0.0 }));
+        let report = s.step(end).unwrap();
+        assert!((report.energy - q * end).abs() < 1e-12, "heat that came in: {}", report.energy);
+        error(&x, &s.get_all("T").unwrap(), |x| SLAB.heated(0.0, q, x, end))
+    });
+}
+
+#[test]
+fn convection_cools_a_slab() {
+    for h in [0.5, 5.0] {
+        let cooling = Cooling::new(SLAB, 1.0, h, 0.2);
+        first_order(1.0, |n| {
+            let x = row(n, 0);
+            let mut s = slab("kernel=M6", &x, n);
+            set(&mut s, "h_conv", &field(&x, 1, |p| if p[0] > 1.0 - 1.0 / n as f64 { h } else { 0.0 }));
+            s.set_number("T_ambient", 0.2).unwrap();
+            s.set_number("T", 1.0).unwrap();
+            s.step(0.3).unwrap();
+            error(&x, &s.get_all("T").unwrap(), |x| cooling.at(x, 0.3))
+        });
+    }
+}
+
+#[test]
+fn convection_and_radiation_reach_their_steady_states() {
+    let (hot, cold, sigma) = (2.0, 0.5, 0.3);
+    let at_the_face =
+        |x: &[f64], n: usize, value: f64| field(x, 1, |p| if p[0] > 1.0 - 1.0 / n as f64 { value } else { 0.0 });
+    let run = |n: usize, name: &str, value: f64| {
+        let x: Vec<f64> = row(n, 8)[..n + 8].to_vec();
+        let mut s = slab("kernel=M6", &x, n);
+        set(&mut s, "fixed", &field(&x, 1, |p| f64::from(p[0] < 0.0)));
+        set(&mut s, "T", &field(&x, 1, |p| if p[0] < 0.0 { hot } else { 1.0 }));
+        set(&mut s, name, &at_the_face(&x, n, value));
+        for (name, value) in [("T_ambient", cold), ("sigma_SB", sigma)] {
+            s.set_number(name, value).unwrap();
+        }
+        s.step(5.0).unwrap();
+        (x, s.get_all("T").unwrap())
+    };
+    first_order(3.0, |n| {
+        let (x, t) = run(n, "h_conv", 3.0);
+        error(&x, &t, |x| SLAB.loses(hot, 3.0, cold, x.max(0.0)))
+    });
+    first_order(3.0, |n| {
+        let (x, t) = run(n, "emissivity", 0.8);
+        error(&x, &t, |x| SLAB.radiates(hot, 0.8 * sigma, cold, x.max(0.0)))
+    });
+}
+
+#[test]
+fn a_lone_particle_radiates_into_the_cold() {
+    let mut s = unit_box("kernel=M4 integrator=rk4", &[0.0], 1, false);
+    for (name, value) in [("h", 0.1), ("c_v", 2.0), ("m", 3.0), ("T", 400.0), ("emissivity", 0.5), ("area", 0.7)] {
+        s.set_number(name, value).unwrap();
+    }
+    let sigma = s.get_number("sigma_SB").unwrap();
+    for _ in 0..100 {
+        s.step(0.1).unwrap();
+    }
+    let exact = radiative_cooling(400.0, 0.7 * 0.5 * sigma / 6.0, 10.0);
+    assert!(exact < 220.0);
+    // Fourth order, 100 steps of which the first changes T by a fiftieth: 0.02^5 times a hundred, at most.
+    assert!((s.get_all("T").unwrap()[0] / exact - 1.0).abs() < 3e-7, "{exact}");
+}
+
+#[test]
+fn a_source_callback_sees_time_temperature_and_the_hosts_numbers() {
+    let x = lattice(10, 2, 0.3);
+    let mut s = unit_box("kernel=M4 integrator=rk4", &x, 2, true);
+    set(&mut s, "T", &vec![1.0; 100]);
+    s.set_number("kappa", 0.0).unwrap();
+    s.set_source_callback(Some(Box::new(|time, index, t, out| {
+        out.iter_mut().zip(index).zip(t).for_each(|((s, &i), t)| *s = time * f64::from(i) - t);
+        0
+    })));
+    for _ in 0..50 {
+        s.step(0.02).unwrap();
+    }
+    // dT/dt = i t − T from T(0) = 1: T = i (t − 1) + (1 + i) e^(−t).
+    for (i, t) in s.get_all("T").unwrap().into_iter().enumerate() {
+        let exact = (1.0 + i as f64) * (-1.0f64).exp();
+        assert!((t - exact).abs() < 1e-7 * (1.0 + i as f64), "{i}: {t} {exact}");
+    }
+    let before = s.get_all("T").unwrap();
+    s.set_source_callback(Some(Box::new(|_, _, _, _| 7)));
+    let e = s.step(0.1).unwrap_err();
+    assert_eq!((e.name(), e.to_string().contains("source callback returned 7")), ("CALLBACK_FAILED", true));
+    assert_eq!(bits(&before), bits(&s.get_all("T").unwrap()));
+}
+
+#[test]
+fn a_nonlinear_wave_keeps_its_front() {
+    for (n_law, kernel) in [(2.5, "M6"), (6.0, "M6")] {
+        let wave = Barenblatt { a: 1.0, n: n_law, strength: 1.0, centre: [0.0; 3], dim: 1 };
+        let (start, end) = (1.0, 3.0);
+        let width = 1.3 * wave.front(end);
+        let n = 200;
+        let x: Vec<f64> = (0..n).map(|i| width * (2.0 * (i as f64 + 0.5) / n as f64 - 1.0)).collect();
+        let run = |callback: bool| {
+            let mut s = unit_box(&format!("kernel={kernel} mean=arithmetic integrator=euler"), &x, 1, false);
+            s.set_number("m", 2.0 * width / n as f64).unwrap();
+            set(&mut s, "T", &field(&x, 1, |p| wave.at([p[0], 0.0, 0.0], start)));
+            if callback {
+                s.set_kappa_callback(Some(Box::new(move |_, _, t, kappa| {
+                    kappa.iter_mut().zip(t).for_each(|(k, t)| *k = (t / 1.0).powf(n_law));
+                    0
+                })));
+            } else {
+                s.set_law("kappa", &format!("power n={n_law}")).unwrap();
+            }
+            let report = s.step(end - start).unwrap();
+            assert!((report.energy / report.energy_before - 1.0).abs() < 1e-12 && report.t_min >= 0.0);
+            s.get_all("T").unwrap()
+        };
+        let t = run(false);
+        assert_eq!(bits(&t), bits(&run(true)));
+        let exact = field(&x, 1, |p| wave.at([p[0], 0.0, 0.0], end));
+        // The front: where T falls below a hundredth of the middle. Two smoothing lengths (h_fac 1) of it.
+        let front = |t: &[f64]| {
+            x.iter().zip(t).filter(|(_, t)| **t > 0.01 * t_max(&exact)).map(|(x, _)| x.abs()).fold(0.0, f64::max)
+        };
+        assert!(
+            (front(&t) - wave.front(end)).abs() < 2.0 * 2.0 * width / n as f64,
+            "{n_law}: {} {}",
+            front(&t),
+            wave.front(end)
+        );
+        assert!(l2(&t, &exact) < 0.03, "{n_law}: {:e}", l2(&t, &exact));
+    }
+}
+
+fn t_max(t: &[f64]) -> f64 {
+    t.iter().copied().fold(f64::NEG_INFINITY, f64::max)
+}
+
+#[test]
+fn a_table_is_a_law() {
+    let x = row(30, 0);
+    let run = |law: Option<&str>| {
+        let mut s = slab("kernel=M4", &x, 30);
+        if let Some(law) = law {
+            s.set_law("kappa", law).unwrap();
+        }
+        set(&mut s, "T", &field(&x, 1, |p| p[0]));
+        s.step(0.01).unwrap();
+        s.get_all("T").unwrap()
+    };
+    // A constant table is a constant: sums in another grouping, and sub-steps of another length.
+    assert!(l2(&run(Some("table T=0,1 kappa=1,1")), &run(None)) < 1e-4);
+    assert!(l2(&run(Some("table T=0,1 kappa=1,3")), &run(None)) > 1e-3);
+}
+
+#[test]
+fn bodies_in_contact_meet_at_their_effusivities() {
+    let contact = Contact { at: 0.0, temperature: [1.0, 2.0], kappa: [1.0, 10.0], capacity: [2.0, 0.5] };
+    let n = 400;
+    let x: Vec<f64> = (0..n).map(|i| 2.0 * (i as f64 + 0.5) / n as f64 - 1.0).collect();
+    let mut s = unit_box("kernel=M6", &x, 1, false);
+    let side = |p: &[f64], values: [f64; 2]| values[usize::from(p[0] >= 0.0)];
+    s.set_number("m", 2.0 / n as f64).unwrap();
+    set(&mut s, "kappa", &field(&x, 1, |p| side(p, contact.kappa)));
+    set(&mut s, "c_v", &field(&x, 1, |p| side(p, contact.capacity)));
+    set(&mut s, "T", &field(&x, 1, |p| side(p, contact.temperature)));
+    s.step(0.005).unwrap();
+    let t = s.get_all("T").unwrap();
+    // 200 particles a side: half a spacing of the steepest slope is 1e-3; the exact solution knows no ends, which the
+    // faster side feels at 1e-4.
+    let error = error(&x, &t, |x| contact.at([x, 0.0, 0.0], 0.005));
+    assert!(error < 1e-3, "{error:e}");
+}
+
+#[test]
+fn heat_flows_between_cylinders() {
+    let x: Vec<f64> = lattice(80, 2, 0.2).iter().map(|c| 2.0 * c - 1.0).collect();
+    let shell = Shell { radius: [0.3, 0.9], temperature: [2.0, 1.0], centre: [0.0; 3], dim: 2 };
+    let n = x.len() / 2;
+    let run = |operator: &str, normalise: &str| {
+        let mut s = unit_box(&format!("kernel=M6 operator={operator} normalise={normalise}"), &x, 2, false);
+        s.set_number("m", 4.0 / n as f64).unwrap();
+        set(&mut s, "fixed", &field(&x, 2, |p| f64::from(!(0.3..0.9).contains(&p[0].hypot(p[1])))));
+        let exact = field(&x, 2, |p| shell.at([p[0], p[1], 0.0]));
+        set(&mut s, "T", &exact);
+        s.step(1.0).unwrap();
+        l2(&s.get_all("T").unwrap(), &exact)
+    };
+    for operator in ["brookshaw", "kernel"] {
+        // 20 % jitter: the first moment is not corrected, which leaves a percent.
+        let (pair, none) = (run(operator, "pair"), run(operator, "none"));
+        assert!(pair < 1e-2 && pair < 1.1 * none, "{operator}: {pair:e} {none:e}");
+    }
+}
+
+#[test]
+fn layouts_of_hosts_are_read_in_place() {
+    let x = lattice(8, 3, 0.2);
+    let n = 512;
+    let t = field(&x, 3, |p| p[0] + p[2]);
+    let mut plain = unit_box("kernel=M4", &x, 3, true);
+    set(&mut plain, "T", &t);
+    set(&mut plain, "h", &vec![0.2; n]);
+    // Phantom: xyzh(4, n), with T in a struct of five doubles.
+    let xyzh: Vec<f64> = x.chunks(3).flat_map(|p| [p[0], p[1], p[2], 0.2]).collect();
+    let structs: Vec<f64> = t.iter().flat_map(|&t| [9.0, 9.0, t, 9.0, 9.0]).collect();
+    let mut strided = Solver::new("heat dim=3 kernel=M4").unwrap();
+    strided.set_box(&[0.0; 3], &[1.0; 3], &[true; 3]).unwrap();
+    strided.set_particles(Strided::new("x", &xyzh, n, 4, 3).unwrap()).unwrap();
+    for (name, value) in [("m", 1.0 / n as f64), ("rho", 1.0), ("kappa", 1.0)] {
+        strided.set_number(name, value).unwrap();
+    }
+    strided.set("h", Strided::new("h", &xyzh[3..], n, 4, 1).unwrap()).unwrap();
+    strided.set("T", Strided::new("T", &structs[2..], n, 5, 1).unwrap()).unwrap();
+    for s in [&mut plain, &mut strided] {
+        s.step(1e-3).unwrap();
+    }
+    assert_eq!(bits(&plain.get_all("T").unwrap()), bits(&strided.get_all("T").unwrap()));
+}
+
+#[test]
+fn gradients_are_exact_for_linear_fields_anywhere() {
+    let x = lattice(14, 3, 0.6);
+    let mut s = unit_box("kernel=M4", &x, 3, false);
+    set(&mut s, "T", &field(&x, 3, |p| 1.0 + 2.0 * p[0] - 3.0 * p[1] + 0.5 * p[2]));
+    let (gradient, flux) = (s.get_all("grad_T").unwrap(), s.get_all("flux").unwrap());
+    for (g, q) in gradient.chunks(3).zip(flux.chunks(3)) {
+        let off = [g[0] - 2.0, g[1] + 3.0, g[2] - 0.5, q[0] + 2.0, q[1] - 3.0, q[2] + 0.5];
+        // A 3x3 inverse of a matrix of condition some tens.
+        assert!(max_abs(&off) < 1e-11, "{g:?} {q:?}");
+    }
+}

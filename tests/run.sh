@@ -1,0 +1,43 @@
+#!/bin/sh
+# Runs every test. Brings what the tests need: compilers and valgrind from the system's packages where this user may
+# install them, Python packages into target/venv. Says exactly what is missing where it may not.
+set -eu
+cd "$(dirname "$0")/.."
+
+missing=""
+need() { # command, Debian package
+    command -v "$1" >/dev/null 2>&1 || missing="$missing $2"
+}
+need gcc gcc
+need g++ g++
+need gfortran gfortran
+need make make
+need cmake cmake
+need valgrind valgrind
+need pkg-config pkg-config
+need python3 python3
+python3 -c 'import ensurepip' 2>/dev/null || missing="$missing python3-venv"
+
+if [ -n "$missing" ]; then
+    as_root=""
+    [ "$(id -u)" -eq 0 ] || as_root="sudo -n"
+    echo "installing:$missing"
+    # shellcheck disable=SC2086 # the packages are words
+    if ! { $as_root apt-get update -qq && DEBIAN_FRONTEND=noninteractive $as_root apt-get install -y -qq $missing; } >/dev/null; then
+        echo "missing:$missing. Install these packages with your system's package manager, then run this again." >&2
+        exit 1
+    fi
+fi
+
+if [ -z "${DIFFUSPH_PYTHON:-}" ]; then
+    python=target/venv/bin/python
+    if ! "$python" -c 'import meshio, vtk, pyvista, numpy' 2>/dev/null; then
+        python3 -m venv target/venv
+        "$python" -m pip install --quiet meshio==5.3.5 vtk pyvista numpy
+    fi
+    DIFFUSPH_PYTHON="$PWD/$python"
+    export DIFFUSPH_PYTHON
+fi
+
+cargo build --locked --all-features
+cargo test --locked --all-features "$@"
