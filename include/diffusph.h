@@ -19,6 +19,8 @@
  * - Units are SI where the host uses SI; any consistent system works (set sigma_SB where surfaces radiate).
  * - A solver may be used from any thread, by one call at a time; a second call answers BUSY, except diffusph_cancel.
  *   Different solvers do not know of each other: there is no global state.
+ * - Worker threads belong to the solver. In a host with OpenMP, OMP_WAIT_POLICY=passive keeps the host's idle threads
+ *   from competing with them.
  * - The library prints nothing, installs no signal handler, and does not end the process.
  * - The host's floating-point environment (traps, rounding, flushing) is put aside during a call and is back after it.
  *   Callbacks run in the default environment, on the thread of the call. They must not throw, nor jump out.
