@@ -64,7 +64,7 @@ impl Item {
     fn step(&mut self, applications: usize) -> f64 {
         let start = Instant::now();
         let report = self.solver.step(self.dt * 10.0 * applications as f64).unwrap();
-        start.elapsed().as_secs_f64() / report.substeps as f64
+        start.elapsed().as_secs_f64() / report.applications as f64
     }
 
     /// Seconds to find neighbours and make weights for particles that have moved.
@@ -142,7 +142,7 @@ fn table(sizes: &[usize]) {
                 }
             }
             let per_step = median(ours);
-            let bytes = 12.0 * neighbours * item.count() as f64 / per_step;
+            let bytes = 10.0 * neighbours * item.count() as f64 / per_step;
             let per = per_step / item.count() as f64 * 1e9;
             let (scipy, ratio) = match theirs.is_empty() {
                 true => ("-".into(), "-".into()),

@@ -41,5 +41,7 @@ pub mod study;
 #[cfg(feature = "cli")]
 pub mod cli;
 
+pub mod ffi;
+
 pub use array::{Strided, StridedMut};
 pub use solver::Solver;

@@ -1,10 +1,10 @@
 //! What disorder and free surfaces do to the operators, and why `normalise=pair` is the default: on lattices, jittered
 //! lattices, a glass and a dam break, with real particles from another code (tests/data).
 
-mod common;
+mod particles;
 
-use common::*;
 use diffusph::Solver;
+use particles::*;
 use std::f64::consts::PI;
 
 fn data(name: &str) -> diffusph::io::Snapshot {

@@ -1,10 +1,10 @@
 //! Each rule of the plan, on and off: the plan names it, and the answer stays the same.
 
-mod common;
+mod particles;
 
-use common::*;
 use diffusph::plan::rules::{RULES, Same};
 use diffusph::{Solver, Strided};
+use particles::*;
 
 struct Scene {
     /// The rule that this scene is for.

@@ -11,12 +11,14 @@
 //! holds.
 
 pub mod gradient;
+pub mod matrix;
 pub mod mean;
 pub mod moments;
 pub mod once;
 pub mod spectrum;
 pub mod table;
 
+pub use matrix::Matrix;
 pub use mean::Mean;
-pub use once::{Assembly, Matrix, Pairs};
+pub use once::{Assembly, Pairs};
 pub use table::Operator;

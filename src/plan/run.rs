@@ -61,6 +61,7 @@ impl State {
     /// # Errors
     /// Any error of [`State::prepare`]; `CallbackFailed`.
     pub fn rate(&mut self) -> Result<Vec<f64>> {
+        self.cancel.store(false, Ordering::Relaxed);
         self.rates += 1;
         let mut plan = self.prepare_fresh("rate")?;
         if !plan.leaves_out("used_once") {
@@ -80,6 +81,7 @@ impl State {
 
     /// Bounds on the operator now, refined by power iteration.
     pub fn bounds(&mut self) -> Result<Bounds> {
+        self.cancel.store(false, Ordering::Relaxed);
         let plan = self.prepare("limit")?;
         let (t, time) = (self.each(fields::T)?, self.time);
         self.with_motion(&plan, |motion| {

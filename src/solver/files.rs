@@ -3,12 +3,12 @@
 use super::{Solver, expect};
 use crate::array::Strided;
 use crate::error::Result;
-use crate::io::{self, Column, Options, Snapshot, Values, View};
+use crate::io::{self, Column, Entry, Options, Series, Snapshot, Values, View};
 use crate::memory;
-use crate::model::fields::{self, Access, FIELDS, INPUTS};
+use crate::model::fields::{self, FIELDS, INPUTS};
 use crate::plan::state::Input;
 use std::borrow::Cow;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What a snapshot always holds; inputs that were given per particle are added.
 const ALWAYS: &[&str] = &["T", "m", "rho", "h", "kappa"];
@@ -63,6 +63,24 @@ impl Solver {
         }
     }
 
+    /// Writes the next numbered snapshot beside a `.pvd` list and lists it; answers its path. Snapshots listed at this
+    /// time or later are replaced: a run that was restarted goes on where it stands.
+    ///
+    /// # Errors
+    /// As [`Solver::write_vtk`]; `BadFile` when the list is none.
+    pub fn write_series(&mut self, list: impl AsRef<Path>) -> Result<PathBuf> {
+        let list = list.as_ref();
+        let mut series = Series::open_or_create(list)?;
+        let earlier: Vec<&Entry> = series.entries().iter().filter(|e| e.time < self.state.time).collect();
+        let taken = |name: &String| earlier.iter().any(|e| Path::new(&e.file).file_name() == Some(name.as_ref()));
+        let stem = list.file_stem().unwrap_or_default().to_string_lossy();
+        let names = (earlier.len()..).map(|number| format!("{stem}_{number:04}.vtu"));
+        let path = list.with_file_name(names.filter(|name| !taken(name)).take(1).collect::<String>());
+        self.write_vtk(&path)?;
+        series.append(self.state.time, &path)?;
+        Ok(path)
+    }
+
     /// Particles from a VTK file: positions, every array that has the name of an input, and the time if there is one.
     ///
     /// # Errors
@@ -78,22 +96,14 @@ impl Solver {
     pub fn set_snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
         let (n, dim) = (snapshot.points.len(), self.dim());
         let x = memory::collected("x", (0..n * dim).map(|k| snapshot.points[k / dim][k % dim]))?;
-        let x = Strided::new("x", &x, n, dim, dim)?;
-        x.check("x", "coordinates must be finite", f64::is_finite)?;
         let mut found = Vec::new();
         for input in &FIELDS[..INPUTS] {
             let Some(field) = snapshot.field(input.name) else { continue };
             expect(input.name, field.components, 1, "one component")?;
-            let values = field.data.to_f64()?;
-            if let Access::Input { domain, .. } = input.access {
-                Strided::packed(&values).check(input.name, domain.rule(), |v| domain.holds(v))?;
-            }
-            found.push((input.name, values));
+            found.push((input.name, field.data.to_f64()?));
         }
-        self.set_particles(x)?;
-        for (name, values) in found {
-            self.set(name, Strided::packed(&values))?;
-        }
+        let given: Vec<_> = found.iter().map(|(name, values)| (*name, Strided::packed(values))).collect();
+        self.set_particles_with(Strided::new("x", &x, n, dim, dim)?, &given)?;
         self.state.time = snapshot.time.unwrap_or(self.state.time);
         Ok(())
     }

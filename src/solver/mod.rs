@@ -99,6 +99,20 @@ impl Solver {
         self.state.set_positions(x)
     }
 
+    /// Positions together with inputs per particle: all of them are checked before anything is changed.
+    ///
+    /// # Errors
+    /// As [`Solver::set_particles`] and [`Solver::set`].
+    pub fn set_particles_with(&mut self, x: Strided, given: &[(&str, Strided)]) -> Result<()> {
+        expect("x", x.components(), self.dim(), "dim components per particle")?;
+        x.check("x", "coordinates must be finite", f64::is_finite)?;
+        for (name, values) in given {
+            check(fields::slot(name)?, name, values, x.len())?;
+        }
+        self.set_particles(x)?;
+        given.iter().try_for_each(|(name, values)| self.set(name, *values))
+    }
+
     /// A quantity for each particle; the catalogue `fields` lists them.
     ///
     /// # Errors
@@ -111,11 +125,7 @@ impl Solver {
         let energy = name == "u";
         let slot = if energy { fields::T } else { fields::slot(name)? };
         let cloud = self.state.cloud("set")?;
-        expect(name, values.len(), self.len(), "one value per particle")?;
-        expect(name, values.components(), 1, "one component")?;
-        if let Access::Input { domain, .. } = FIELDS[slot].access {
-            values.check(name, domain.rule(), |v| domain.holds(v))?;
-        }
+        check(slot, name, &values, self.len())?;
         let mut values = cloud.inward(name, values, 0)?;
         if energy {
             let c_v = self.state.each(fields::C_V)?;
@@ -224,6 +234,16 @@ impl Solver {
     /// Forgets the worker threads, which do not exist in a forked child; for a handle that is thrown away there.
     pub fn abandon(self) {
         self.state.pool.abandon();
+    }
+}
+
+/// Whether an input has one value per particle, each of which makes sense.
+fn check(slot: fields::Slot, name: &str, values: &Strided, n: usize) -> Result<()> {
+    expect(name, values.len(), n, "one value per particle")?;
+    expect(name, values.components(), 1, "one component")?;
+    match FIELDS[slot].access {
+        Access::Input { domain, .. } => values.check(name, domain.rule(), |v| domain.holds(v)),
+        Access::Output => Ok(()),
     }
 }
 

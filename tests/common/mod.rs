@@ -1,66 +1,52 @@
-//! Particles and solvers that several tests use.
-#![allow(dead_code)] // Each test binary uses its own part of this.
+//! What the tests of the C ABI share: where things are, how tools are run, and the header as data.
+#![allow(dead_code)] // each test uses a part
 
-use diffusph::{Solver, Strided};
+pub mod header;
+pub mod host;
 
-/// A linear congruential generator: the same particles on every machine.
-pub struct Random(pub u64);
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output};
 
-impl Random {
-    /// Uniform in [-1, 1).
-    pub fn next(&mut self) -> f64 {
-        self.0 = self.0.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        2.0 * ((self.0 >> 11) as f64 / (1u64 << 53) as f64) - 1.0
+pub fn root() -> &'static Path {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+}
+
+/// Where cargo has put `libdiffusph.so` and `libdiffusph.a` for the tests of this profile: beside the tests. It copies them
+/// one folder up for `cargo build` alone.
+pub fn library_folder() -> PathBuf {
+    let test = std::env::current_exe().unwrap();
+    let folder = test.parent().unwrap().to_path_buf();
+    for file in ["libdiffusph.so", "libdiffusph.a"] {
+        assert!(folder.join(file).is_file(), "{} is missing", folder.join(file).display());
     }
+    folder
 }
 
-/// A cell-centred lattice of n^dim points in the unit box, each coordinate moved by up to `jitter` spacings.
-pub fn lattice(n: usize, dim: usize, jitter: f64) -> Vec<f64> {
-    let mut random = Random(12345);
-    let cell = |p: usize, a: usize| ((p / n.pow(a as u32)) % n) as f64 + 0.5;
-    let points = (0..n.pow(dim as u32)).flat_map(|p| (0..dim).map(move |a| (p, a)));
-    points.map(|(p, a)| (cell(p, a) + jitter * random.next()) / n as f64).collect()
+/// Installs the library under test as a host would find it; answers the prefix.
+pub fn installed(folder: &Path) -> PathBuf {
+    let prefix = folder.join("prefix");
+    let define = |name: &str, value: &Path| format!("-D{name}={}", value.display());
+    let mut cmake = Command::new("cmake");
+    cmake.arg(define("PREFIX", &prefix)).arg(define("FROM", &library_folder()));
+    succeed(cmake.arg("-P").arg(root().join("include/install.cmake")));
+    prefix
 }
 
-/// A solver on particles of total mass 1 and kappa 1 in the unit box, periodic or open; rho is 1 as given.
-pub fn unit_box(words: &str, x: &[f64], dim: usize, periodic: bool) -> Solver {
-    let n = x.len() / dim;
-    let mut s = Solver::new(&format!("heat dim={dim} {words}")).unwrap();
-    if periodic {
-        s.set_box(&[0.0; 3][..dim], &[1.0; 3][..dim], &[true; 3][..dim]).unwrap();
-    }
-    s.set_particles(Strided::new("x", x, n, dim, dim).unwrap()).unwrap();
-    for (name, value) in [("m", 1.0 / n.max(1) as f64), ("rho", 1.0), ("kappa", 1.0)] {
-        s.set_number(name, value).unwrap();
-    }
-    s
+/// Runs a tool; where it is missing, says what to install.
+pub fn run(command: &mut Command) -> Output {
+    command.output().unwrap_or_else(|e| {
+        panic!(
+            "cannot run {} ({e}); these tests need C, C++ and Fortran compilers, make, CMake,\n    pkg-config and valgrind:\n    \
+             apt-get install gcc g++ gfortran make cmake valgrind",
+            command.get_program().to_string_lossy()
+        )
+    })
 }
 
-pub fn set(s: &mut Solver, name: &str, values: &[f64]) {
-    s.set(name, Strided::packed(values)).unwrap();
-}
-
-/// f at each particle.
-pub fn field(x: &[f64], dim: usize, f: impl Fn(&[f64]) -> f64) -> Vec<f64> {
-    x.chunks(dim).map(f).collect()
-}
-
-/// Relative l2 difference of a from b.
-pub fn l2(a: &[f64], b: &[f64]) -> f64 {
-    let (difference, size): (f64, f64) =
-        a.iter().zip(b).fold((0.0, 0.0), |(d, s), (a, b)| (d + (a - b) * (a - b), s + b * b));
-    (difference / size).sqrt()
-}
-
-pub fn bits(values: &[f64]) -> Vec<u64> {
-    values.iter().map(|v| v.to_bits()).collect()
-}
-
-pub fn max_abs(values: &[f64]) -> f64 {
-    values.iter().fold(0.0, |m, v| m.max(v.abs()))
-}
-
-/// Names of a catalogue.
-pub fn names(catalogue: &str) -> Vec<String> {
-    diffusph::solver::catalogue::catalogue(catalogue).unwrap().into_iter().map(|item| item.name).collect()
+/// Runs a tool that must succeed; answers what it printed.
+pub fn succeed(command: &mut Command) -> String {
+    let done = run(command);
+    let (out, err) = (String::from_utf8_lossy(&done.stdout), String::from_utf8_lossy(&done.stderr));
+    assert!(done.status.success(), "{command:?}: {}\n{out}\n{err}", done.status);
+    out.into_owned()
 }

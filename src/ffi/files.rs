@@ -1,0 +1,43 @@
+//! VTK files.
+
+use super::guard::{Handle, with};
+use super::pointers::file;
+use std::ffi::c_char;
+
+/// Writes the particles and their quantities, with the time: a .vtu, or a legacy .vtk if the name ends so. The file
+/// appears whole or not at all.
+///
+/// Errors: IO, OUT_OF_ORDER before T, m and kappa are set.
+///
+/// # Safety
+/// The header's conventions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn diffusph_write_vtk(s: *mut Handle, path: *const c_char) -> i32 {
+    unsafe { with(s, |inside| inside.solver.write_vtk(file("path", path)?)) }
+}
+
+/// Writes the next snapshot of a series and lists it: for "run.pvd", the files run_0000.vtu, run_0001.vtu and so on
+/// beside it. Snapshots listed at this time or later are replaced, so that a restarted run goes on where it stands.
+///
+/// \param pvd_path the list, for ParaView
+///
+/// Errors: as diffusph_write_vtk; BAD_FILE when the list is none.
+///
+/// # Safety
+/// The header's conventions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn diffusph_write_series(s: *mut Handle, pvd_path: *const c_char) -> i32 {
+    unsafe { with(s, |inside| inside.solver.write_series(file("pvd_path", pvd_path)?).map(drop)) }
+}
+
+/// Takes particles from a VTK file (.vtu, .vtp, .pvtu, .pvtp, legacy .vtk): positions, every array with the name of a
+/// quantity that can be set, and the time if there is one.
+///
+/// Errors: IO, BAD_FILE, BAD_VALUE naming the first bad element; nothing is changed then.
+///
+/// # Safety
+/// The header's conventions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn diffusph_read_vtk(s: *mut Handle, path: *const c_char) -> i32 {
+    unsafe { with(s, |inside| inside.solver.read_vtk(file("path", path)?)) }
+}

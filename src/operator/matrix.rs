@@ -1,0 +1,380 @@
+//! Stored weights of pairs: a sparse matrix in blocks of [`BLOCK`] rows, applied at the speed of the memory.
+//!
+//! Bytes are the bound, so a column is 16 bits wherever a block's neighbours live in at most 64 blocks, which on sorted
+//! particles is nearly always: 6 bits name the block, 10 the particle in it.
+
+use super::Mean;
+use crate::error::Result;
+use crate::memory;
+use crate::pool::{BLOCK, Pool};
+use std::ops::Range;
+
+/// Bits of a particle's place in its block, and the number of blocks that the rest of a short column can name.
+const PLACE: u32 = BLOCK.trailing_zeros();
+const NAMES: usize = 1 << (16 - PLACE);
+
+/// Symmetric coefficients g_ab = V_a V_b w_ab (and what was folded into them), in rows.
+pub struct Matrix {
+    n: usize,
+    blocks: Vec<Block>,
+}
+
+pub struct Block {
+    first: usize,
+    start: Vec<u32>,
+    columns: Columns,
+    coef: Vec<f64>,
+    /// The blocks in which the neighbours live, sorted.
+    touches: Vec<u32>,
+}
+
+enum Columns {
+    Short(Vec<u16>),
+    Long(Vec<u32>),
+}
+
+/// A worker's notes on which blocks a block's neighbours live in: for each block of particles, one more than its place
+/// in the list of those touched.
+#[derive(Default)]
+pub struct Seen(Vec<u32>);
+
+impl Seen {
+    fn touched(&mut self, col: &[u32]) -> Result<Vec<u32>> {
+        let mut list = Vec::new();
+        for &j in col {
+            let block = j >> PLACE;
+            if block as usize >= self.0.len() {
+                let more = block as usize + 1 - self.0.len();
+                self.0.try_reserve(more).map_err(|_| memory::no_memory::<u32>("block list", more))?;
+                self.0.resize(block as usize + 1, 0);
+            }
+            if self.0[block as usize] == 0 {
+                self.0[block as usize] = 1;
+                list.push(block);
+            }
+        }
+        list.sort_unstable();
+        list.iter().zip(1..).for_each(|(&block, place)| self.0[block as usize] = place);
+        Ok(list)
+    }
+
+    fn short(&self, j: u32) -> u16 {
+        let name = self.0[(j >> PLACE) as usize] - 1;
+        (name << PLACE | (j & (BLOCK as u32 - 1))) as u16
+    }
+
+    fn forget(&mut self, touched: &[u32]) {
+        touched.iter().for_each(|&block| self.0[block as usize] = 0);
+    }
+}
+
+impl Block {
+    /// Block number `b` from the columns (all below `n`) and coefficients of its rows, row k from `start[k]` to
+    /// `start[k + 1]`.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn new(n: usize, b: usize, start: Vec<u32>, col: &[u32], coef: &[f64], seen: &mut Seen) -> Result<Block> {
+        assert!(col.iter().all(|&j| (j as usize) < n), "a neighbour that does not exist");
+        if col.len() > u32::MAX as usize {
+            return Err(memory::no_memory::<(u32, f64)>("matrix", col.len()));
+        }
+        let touches = seen.touched(col)?;
+        let columns = if touches.len() <= NAMES {
+            memory::collected("matrix columns", col.iter().map(|&j| seen.short(j))).map(Columns::Short)
+        } else {
+            memory::copied("matrix columns", col).map(Columns::Long)
+        };
+        seen.forget(&touches);
+        let coef = memory::copied("matrix coefficients", coef)?;
+        Ok(Block { first: b * BLOCK, start, columns: columns?, coef, touches })
+    }
+
+    fn len(&self) -> usize {
+        self.start.len() - 1
+    }
+
+    /// The particle of row k, and where its coefficients are.
+    fn row(&self, k: usize) -> (usize, Range<usize>) {
+        (self.first + k, self.start[k] as usize..self.start[k + 1] as usize)
+    }
+
+    /// The first particle of each block that a short column can name.
+    fn bases(&self) -> [usize; NAMES] {
+        let mut bases = [0; NAMES];
+        bases.iter_mut().zip(&self.touches).for_each(|(base, &block)| *base = block as usize * BLOCK);
+        bases
+    }
+
+    /// The column of a coefficient; the sums below decode whole rows.
+    fn column(&self, at: usize) -> usize {
+        match &self.columns {
+            Columns::Long(col) => col[at] as usize,
+            Columns::Short(col) => {
+                let c = col[at] as usize;
+                self.touches[c >> PLACE] as usize * BLOCK + c % BLOCK
+            }
+        }
+    }
+
+    fn sums(
+        &self,
+        t: &[f64],
+        out: &mut [f64],
+        finish: impl Fn(usize, f64) -> f64,
+        g: impl Fn(usize, usize, f64) -> f64,
+    ) {
+        match &self.columns {
+            Columns::Long(col) => self.sums_of(col, |j| j as usize, t, out, finish, g),
+            Columns::Short(col) => {
+                let bases = self.bases();
+                let index = |c: u16| bases[usize::from(c >> PLACE)] + usize::from(c) % BLOCK;
+                self.sums_of(col, index, t, out, finish, g);
+            }
+        }
+    }
+
+    fn sums_of<C: Copy>(
+        &self,
+        col: &[C],
+        index: impl Fn(C) -> usize + Copy,
+        t: &[f64],
+        out: &mut [f64],
+        finish: impl Fn(usize, f64) -> f64,
+        g: impl Fn(usize, usize, f64) -> f64,
+    ) {
+        for (k, out) in out.iter_mut().enumerate() {
+            let (i, range) = self.row(k);
+            let sum = row_sum(&col[range.clone()], &self.coef[range], t, t[i], index, |j, c| g(i, j, c));
+            *out = finish(i, sum);
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        let columns = match &self.columns {
+            Columns::Short(col) => memory::bytes(col),
+            Columns::Long(col) => memory::bytes(col),
+        };
+        columns + memory::bytes(&self.start) + memory::bytes(&self.coef) + memory::bytes(&self.touches)
+    }
+}
+
+impl Matrix {
+    pub fn new(n: usize, blocks: Vec<Block>) -> Matrix {
+        Matrix { n, blocks }
+    }
+
+    pub fn len(&self) -> usize {
+        self.n
+    }
+
+    pub fn is_empty(&self) -> bool {
+        self.n == 0
+    }
+
+    /// Stored pairs, both directions counted.
+    pub fn pairs(&self) -> u64 {
+        self.blocks.iter().map(|b| b.coef.len() as u64).sum()
+    }
+
+    pub fn bytes(&self) -> u64 {
+        self.blocks.iter().map(Block::bytes).sum()
+    }
+
+    /// Multiplies each coefficient by `factor(a, b)`, which must be symmetric to the bit.
+    pub fn scale(&mut self, pool: &Pool, factor: impl Fn(usize, usize) -> f64 + Sync + Send) {
+        pool.chunks(&mut self.blocks, 1, |_, part| {
+            for block in part {
+                for k in 0..block.len() {
+                    let (i, range) = block.row(k);
+                    for at in range {
+                        block.coef[at] *= factor(i, block.column(at));
+                    }
+                }
+            }
+        });
+    }
+
+    /// out_a = finish(a, Σ_b g_ab mean(k_a, k_b) (T_b − T_a)), the mean left out where `kappa` is none.
+    ///
+    /// `quiet` skips blocks whose values and neighbours' values are all the same: their sums are exactly zero.
+    pub fn apply(
+        &self,
+        pool: &Pool,
+        kappa: Option<(Mean, &[f64])>,
+        t: &[f64],
+        out: &mut [f64],
+        quiet: bool,
+        finish: impl Fn(usize, f64) -> f64 + Sync + Send,
+    ) {
+        assert!(t.len() == self.n && out.len() == self.n, "one value for each particle");
+        let levels = quiet.then(|| self.levels(pool, t));
+        pool.chunks(out, BLOCK, |start, part| {
+            let block = &self.blocks[start / BLOCK];
+            if levels.as_ref().is_some_and(|l| is_quiet(l, start / BLOCK, &block.touches)) {
+                return part.fill(0.0);
+            }
+            // One loop per average, so that the choice is made once per block and not once per pair.
+            match kappa {
+                None => block.sums(t, part, &finish, |_, _, c| c),
+                Some((Mean::Harmonic, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Harmonic.of(k[i], k[j])),
+                Some((Mean::Arithmetic, k)) => {
+                    block.sums(t, part, &finish, |i, j, c| c * Mean::Arithmetic.of(k[i], k[j]))
+                }
+                Some((Mean::Geometric, k)) => {
+                    block.sums(t, part, &finish, |i, j, c| c * Mean::Geometric.of(k[i], k[j]))
+                }
+            }
+        });
+    }
+
+    /// Σ_b |g_ab| mean(k_a, k_b) of each row, and |Σ_b g_ab mean(k_a, k_b)| beside it: what Gershgorin's circles are made of.
+    pub fn circles(&self, pool: &Pool, kappa: Option<(Mean, &[f64])>) -> Result<Vec<(f64, f64)>> {
+        let mut out = memory::filled("row sums", self.n, (0.0, 0.0))?;
+        pool.chunks(&mut out, BLOCK, |start, part| {
+            let block = &self.blocks[start / BLOCK];
+            for (k, out) in part.iter_mut().enumerate() {
+                let (i, range) = block.row(k);
+                let (mut absolute, mut signed) = (0.0f64, 0.0f64);
+                for at in range {
+                    let (j, c) = (block.column(at), block.coef[at]);
+                    let g = kappa.map_or(c, |(mean, k)| c * mean.of(k[i], k[j]));
+                    // An image of the particle itself exchanges nothing.
+                    let g = if j == i { 0.0 } else { g };
+                    (absolute, signed) = (absolute + g.abs(), signed + g);
+                }
+                *out = (absolute, signed.abs());
+            }
+        });
+        Ok(out)
+    }
+
+    /// Number of stored neighbours of a particle.
+    pub fn neighbours(&self, i: usize) -> usize {
+        let block = &self.blocks[i / BLOCK];
+        let k = i - block.first;
+        (block.start[k + 1] - block.start[k]) as usize
+    }
+
+    /// The smallest coefficient; negative where the operator breaks positivity on some pair.
+    pub fn smallest(&self, pool: &Pool) -> f64 {
+        let of_block = |b: usize| self.blocks[b].coef.iter().copied().fold(f64::INFINITY, f64::min);
+        pool.map(self.blocks.len(), of_block).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The first particle with a coefficient that is not a finite number.
+    pub fn first_bad(&self, pool: &Pool) -> Option<usize> {
+        let of_block = |b: usize| {
+            let block: &Block = &self.blocks[b];
+            let bad = block.coef.iter().position(|c| !c.is_finite())?;
+            (0..block.len()).map(|k| block.row(k)).find(|(_, range)| range.contains(&bad)).map(|(i, _)| i)
+        };
+        pool.map(self.blocks.len(), of_block).into_iter().flatten().next()
+    }
+
+    /// One value for each block whose members all have it.
+    fn levels(&self, pool: &Pool, t: &[f64]) -> Vec<Option<f64>> {
+        pool.map(self.blocks.len(), |b| {
+            let part = &t[b * BLOCK..((b + 1) * BLOCK).min(self.n)];
+            part.iter().all(|&v| v == part[0]).then_some(part[0])
+        })
+    }
+}
+
+fn is_quiet(levels: &[Option<f64>], block: usize, touches: &[u32]) -> bool {
+    levels[block].is_some_and(|own| touches.iter().all(|&b| levels[b as usize] == Some(own)))
+}
+
+/// Σ g(b, c) (T_b − T_a) over a row, b = index(column) always being a particle of `t`. Four running sums: one would wait
+/// for its own last addition at every neighbour.
+#[inline(always)]
+pub(super) fn row_sum<C: Copy>(
+    col: &[C],
+    coef: &[f64],
+    t: &[f64],
+    own: f64,
+    index: impl Fn(C) -> usize,
+    g: impl Fn(usize, f64) -> f64,
+) -> f64 {
+    let term = |c: C, coef: f64| {
+        let j = index(c);
+        debug_assert!(j < t.len());
+        // SAFETY: columns are below the number of particles where they are made, and t has one value for each.
+        g(j, coef) * (unsafe { *t.get_unchecked(j) } - own)
+    };
+    let mut sums = [0.0; 4];
+    let (cols, coefs) = (col.chunks_exact(4), coef.chunks_exact(4));
+    let rest: f64 = cols.remainder().iter().zip(coefs.remainder()).map(|(&j, &c)| term(j, c)).sum();
+    for (j, c) in cols.zip(coefs) {
+        for lane in 0..4 {
+            sums[lane] += term(j[lane], c[lane]);
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Rows of `per_row` neighbours spread over so many blocks, and their sums by the definition.
+    fn random_matrix(blocks: usize, per_row: usize) -> (Matrix, Vec<f64>, Vec<f64>) {
+        let n = blocks * BLOCK - 100;
+        let mut state = 1u64;
+        let mut next = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 33) as usize
+        };
+        let t: Vec<f64> = (0..n).map(|_| next() as f64).collect();
+        let (mut list, mut sums, mut seen) = (Vec::new(), vec![0.0; n], Seen::default());
+        for b in 0..blocks {
+            let (mut start, mut col, mut coef) = (vec![0], Vec::new(), Vec::new());
+            for i in b * BLOCK..((b + 1) * BLOCK).min(n) {
+                for _ in 0..per_row {
+                    let j = next() % n;
+                    col.push(j as u32);
+                    coef.push((next() % 16) as f64);
+                    // Whole numbers below 2^53: exact in any order.
+                    sums[i] += coef[coef.len() - 1] * (t[j] - t[i]);
+                }
+                start.push(col.len() as u32);
+            }
+            list.push(Block::new(n, b, start, &col, &coef, &mut seen).unwrap());
+        }
+        (Matrix::new(n, list), t, sums)
+    }
+
+    #[test]
+    fn short_and_long_columns_give_the_sums_of_the_definition() {
+        for (blocks, short) in [(1, true), (NAMES, true), (NAMES + 6, false)] {
+            let (mut matrix, t, sums) = random_matrix(blocks, 13);
+            assert!(matrix.blocks.iter().all(|b| matches!(b.columns, Columns::Short(_)) == short));
+            let pool = Pool::new(2).unwrap();
+            let mut out = vec![0.0; t.len()];
+            matrix.apply(&pool, None, &t, &mut out, true, |_, s| s);
+            assert_eq!(out, sums);
+            // Scaled by a power of two that depends on both ends, through the other way to read a column.
+            matrix.scale(&pool, |a, b| if (a + b) % 2 == 0 { 2.0 } else { 4.0 });
+            let kappa: Vec<f64> = (0..t.len()).map(|i| if i % 2 == 0 { 1.0 } else { 3.0 }).collect();
+            let plain = matrix.circles(&pool, None).unwrap();
+            let weighed = matrix.circles(&pool, Some((Mean::Arithmetic, &kappa))).unwrap();
+            assert!(plain.iter().zip(&weighed).all(|(p, w)| p.0 <= w.0 && w.0 <= 3.0 * p.0 && p.0 == p.1));
+            assert_eq!(matrix.pairs(), 13 * t.len() as u64);
+        }
+    }
+
+    #[test]
+    fn quiet_blocks_are_zero_and_others_are_not_skipped() {
+        let (matrix, mut t, _) = random_matrix(3, 5);
+        let pool = Pool::new(1).unwrap();
+        let mut out = vec![f64::NAN; t.len()];
+        t.fill(2.0);
+        matrix.apply(&pool, None, &t, &mut out, true, |_, s| s);
+        assert!(out.iter().all(|&o| o == 0.0));
+        t[0] = 3.0;
+        let mut slow = out.clone();
+        matrix.apply(&pool, None, &t, &mut out, true, |_, s| s);
+        matrix.apply(&pool, None, &t, &mut slow, false, |_, s| s);
+        assert!(out == slow && out.iter().any(|&o| o != 0.0));
+    }
+}
