@@ -6,6 +6,7 @@ use super::scene::{Output, Scene};
 use super::setup::{at_all, setup};
 use crate::error::{Error, Result};
 use crate::io::Series;
+use crate::model::fields;
 use crate::plan::Plan;
 use crate::solver::Solver;
 use std::path::{Path, PathBuf};
@@ -155,6 +156,7 @@ struct Writer {
 
 impl Writer {
     fn new(output: &Output, out: &Path) -> Result<Writer> {
+        output.fields.iter().try_for_each(|name| fields::field(name).map(drop))?;
         let pvd = out.join(&output.pvd);
         let folder = pvd.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let failed =

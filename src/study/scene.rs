@@ -195,6 +195,9 @@ impl Scene {
             return Err(Error::bad("particles.jitter", jitter, "it is a share of the spacing, 0 to 1"));
         }
         match &self.output {
+            Some(Output { pvd, .. }) if pvd.extension().is_none_or(|e| e != "pvd") => {
+                Err(Error::bad("output.pvd", format!("'{}'", pvd.display()), "its name must end in .pvd"))
+            }
             Some(output) if output.every == 0 => Err(Error::bad("output.every", 0, "it must be at least 1")),
             _ => Ok(()),
         }
@@ -256,6 +259,7 @@ mod tests {
             ("n = 8", "n = 8\njitter = 2", "0 to 1"),
             ("[time]\nend = 1", "", "missing field `time`"),
             ("T = 1", "T = ", "line 9"),
+            ("end = 1", "end = 1\n[output]\npvd = \"..\"", "end in .pvd"),
         ] {
             let text = complaint(&SMALL.replace(from, to));
             assert!(text.contains(expected), "{to}: {text}");

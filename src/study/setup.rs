@@ -35,8 +35,14 @@ pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
 
 /// Every name is that of a quantity that can be set.
 fn known<'a>(names: impl Iterator<Item = &'a String>) -> Result<()> {
-    let mut others = names.filter(|name| !NUMBERS.iter().any(|n| n.name == name.as_str()));
-    others.try_for_each(|name| fields::slot(name).map(drop))
+    for name in names {
+        match name.as_str() {
+            "time" => return Err(Error::bad("time", "in [set]", "start = … in [time] sets it")),
+            name if NUMBERS.iter().any(|n| n.name == name) => {}
+            name => drop(fields::slot(name)?),
+        }
+    }
+    Ok(())
 }
 
 struct Setup<'a> {
@@ -162,8 +168,9 @@ impl Setup<'_> {
         }
         let fields = || self.snapshot.iter().flat_map(|s| &s.fields);
         let field = fields().find(|f| f.name == text).ok_or_else(|| {
-            let known: Vec<&str> =
-                fields().map(|f| f.name.as_str()).chain(self.exact.iter().map(|_| "exact")).collect();
+            let laws = LAWS.iter().filter(|_| name == "kappa").map(|(law, _)| *law);
+            let exact = self.exact.iter().map(|_| "exact");
+            let known: Vec<&str> = fields().map(|f| f.name.as_str()).chain(exact).chain(laws).collect();
             Error::unknown(&format!("array for {name}"), text, known)
         })?;
         if field.components != 1 {
@@ -271,6 +278,8 @@ mod tests {
             ("[[mark]]\nwhere = {}\nset = { kappa = -1 }", "kappa[0] is -1"),
             ("[[mark]]\nwhere = {}\nset = { kappa = \"power n=2\" }", "for all particles"),
             ("[[mark]]\nwhere = {}\nset = { T = \"teperature\" }", "unknown array for T"),
+            ("[[mark]]\nwhere = {}\nset = { time = 1 }", "in [time]"),
+            ("[[mark]]\nwhere = {}\nset = { kappa = \"pwer\" }", "did you mean 'power'"),
             ("[exact]\nname = \"sin\"", "did you mean 'sine'"),
             ("[exact]\nname = \"sine\"", "waves of sine is missing"),
         ] {
