@@ -46,10 +46,15 @@ impl Count {
         (n, by_h / h)
     }
 
-    /// The root of N(h) = target below `most`, where N is known to be at least the target.
-    fn solve(&mut self, kernel: &Kernel, mass: &[f64], row: &Row, target: f64, most: f64) -> f64 {
+    /// The root of N(h) = target up to `most`; none where N(most) is below the target.
+    fn solve(&mut self, kernel: &Kernel, mass: &[f64], row: &Row, target: f64, most: f64) -> Option<f64> {
+        let (n, _) = self.at(kernel, mass, row, most);
+        if n < target {
+            return None;
+        }
         let (mut low, mut high) = (0.0, most);
-        let mut h = most;
+        // Exact where the neighbours are a continuum.
+        let mut h = most * (target / n).powf(1.0 / kernel.dim() as f64);
         for _ in 0..NEWTON {
             let (n, slope) = self.at(kernel, mass, row, h);
             if n > target {
@@ -65,7 +70,7 @@ impl Count {
                 break;
             }
         }
-        h
+        Some(h)
     }
 }
 
@@ -127,12 +132,16 @@ fn solve_open(kernel: &Kernel, target: f64, rows: &Rows, mass: &[f64], pool: &Po
             return;
         }
         let (mut count, range) = (Count::default(), start..start + part.len());
-        let done = rows.visit(range, &mut Scratch::default(), |row| {
-            let (i, most) = (row.i, rows.h[row.i]);
-            if part[i - start] == 0.0 && count.at(kernel, mass, &row, most).0 >= target {
-                part[i - start] = count.solve(kernel, mass, &row, target, most);
-            }
-        });
+        let open: Vec<bool> = part.iter().map(|&h| h == 0.0).collect();
+        let done = rows.visit_where(
+            range,
+            &mut Scratch::default(),
+            |i| open[i - start],
+            |row| {
+                let found = count.solve(kernel, mass, &row, target, rows.h[row.i]);
+                part[row.i - start] = found.unwrap_or(0.0);
+            },
+        );
         if let (Err(e), Ok(mut slot)) = (done, failed.lock()) {
             *slot = Some(e);
         }
@@ -163,7 +172,7 @@ fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
         cloud.grid.edge * 2f64.powi(low as i32) / (count(low) as f64).powf(1.0 / dim as f64)
     };
     let least = extent(cloud) * 1e-12;
-    memory::collected("h", (0..cloud.len()).map(|i| (1.2 * h_fac * spacing(i)).max(least).max(f64::MIN_POSITIVE)))
+    memory::collected("h", (0..cloud.len()).map(|i| (1.1 * h_fac * spacing(i)).max(least).max(f64::MIN_POSITIVE)))
 }
 
 fn extent(cloud: &Cloud) -> f64 {

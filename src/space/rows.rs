@@ -74,10 +74,21 @@ impl<'a> Rows<'a> {
 
     /// Calls `visit` with the row of every particle in `range`, in order.
     pub fn visit(&self, range: Range<usize>, scratch: &mut Scratch, visit: impl FnMut(Row)) -> Result<()> {
+        self.visit_where(range, scratch, |_| true, visit)
+    }
+
+    /// As [`Rows::visit`], for the particles that are wanted alone.
+    pub fn visit_where(
+        &self,
+        range: Range<usize>,
+        scratch: &mut Scratch,
+        wanted: impl Fn(usize) -> bool,
+        visit: impl FnMut(Row),
+    ) -> Result<()> {
         match self.cloud.dim() {
-            1 => self.visit_in::<1>(range, scratch, visit),
-            2 => self.visit_in::<2>(range, scratch, visit),
-            _ => self.visit_in::<3>(range, scratch, visit),
+            1 => self.visit_in::<1>(range, scratch, wanted, visit),
+            2 => self.visit_in::<2>(range, scratch, wanted, visit),
+            _ => self.visit_in::<3>(range, scratch, wanted, visit),
         }
     }
 
@@ -126,14 +137,20 @@ impl<'a> Rows<'a> {
         Ok(if rows == 0 { 0.0 } else { pairs as f64 / rows as f64 })
     }
 
-    fn visit_in<const D: usize>(&self, range: Range<usize>, s: &mut Scratch, mut visit: impl FnMut(Row)) -> Result<()> {
+    fn visit_in<const D: usize>(
+        &self,
+        range: Range<usize>,
+        s: &mut Scratch,
+        wanted: impl Fn(usize) -> bool,
+        mut visit: impl FnMut(Row),
+    ) -> Result<()> {
         let group_of = |i: usize| self.cells.group_key(self.cloud, i, self.h[i]);
         let mut start = range.start;
         while start < range.end {
             let group = group_of(start);
             let end = (start + 1..range.end).find(|&i| group_of(i) != group).unwrap_or(range.end);
-            let shifted = self.gather(start..end, s)?;
-            for i in start..end {
+            let shifted = if (start..end).any(&wanted) { self.gather(start..end, s)? } else { false };
+            for i in (start..end).filter(|&i| wanted(i)) {
                 let n = if shifted { self.hits::<D, true>(i, s)? } else { self.hits::<D, false>(i, s)? };
                 let d = [0, 1, 2].map(|a| if a < D { &s.row_d[a][..n] } else { &[] });
                 visit(Row { i, j: &s.row_j[..n], r: &s.row_r[..n], d });
