@@ -1,7 +1,6 @@
-//! Stored weights of pairs: a sparse matrix in blocks of [`BLOCK`] rows, applied at the speed of the memory.
-//!
-//! Bytes are the bound, so a column is 16 bits wherever a block's neighbours live in at most 64 blocks, which on sorted
-//! particles is nearly always: 6 bits name the block, 10 the particle in it.
+//! Stored weights of pairs: a sparse matrix in blocks of [`BLOCK`] rows, applied at the speed of the memory. Twelve bytes
+//! a pair: shorter columns (16 bits, named through a table of blocks) were measured to cost more in decoding than they
+//! save in reading.
 
 use super::Mean;
 use crate::error::Result;
@@ -9,9 +8,9 @@ use crate::memory;
 use crate::pool::{BLOCK, Pool};
 use std::ops::Range;
 
-/// Bits of a particle's place in its block, and the number of blocks that the rest of a short column can name.
-const PLACE: u32 = BLOCK.trailing_zeros();
-const NAMES: usize = 1 << (16 - PLACE);
+/// Rows from the one at work to the one whose coefficients are asked of the memory: enough to hide its latency, which
+/// the processor's own prefetching does not across pages (0.8 times the time at a million particles).
+const AHEAD: usize = 8;
 
 /// Symmetric coefficients g_ab = V_a V_b w_ab (and what was folded into them), in rows.
 pub struct Matrix {
@@ -22,49 +21,32 @@ pub struct Matrix {
 pub struct Block {
     first: usize,
     start: Vec<u32>,
-    columns: Columns,
+    col: Vec<u32>,
     coef: Vec<f64>,
     /// The blocks in which the neighbours live, sorted.
     touches: Vec<u32>,
 }
 
-enum Columns {
-    Short(Vec<u16>),
-    Long(Vec<u32>),
-}
-
-/// A worker's notes on which blocks a block's neighbours live in: for each block of particles, one more than its place
-/// in the list of those touched.
+/// A worker's notes on which blocks a block's neighbours live in.
 #[derive(Default)]
-pub struct Seen(Vec<u32>);
+pub struct Seen(Vec<bool>);
 
 impl Seen {
-    fn touched(&mut self, col: &[u32]) -> Result<Vec<u32>> {
+    fn touched(&mut self, n: usize, col: &[u32]) -> Result<Vec<u32>> {
+        let blocks = n.div_ceil(BLOCK);
+        self.0.try_reserve(blocks).map_err(|_| memory::no_memory::<bool>("block list", blocks))?;
+        self.0.resize(blocks, false);
         let mut list = Vec::new();
         for &j in col {
-            let block = j >> PLACE;
-            if block as usize >= self.0.len() {
-                let more = block as usize + 1 - self.0.len();
-                self.0.try_reserve(more).map_err(|_| memory::no_memory::<u32>("block list", more))?;
-                self.0.resize(block as usize + 1, 0);
-            }
-            if self.0[block as usize] == 0 {
-                self.0[block as usize] = 1;
-                list.push(block);
+            let seen = &mut self.0[j as usize / BLOCK];
+            if !*seen {
+                *seen = true;
+                list.push(j / BLOCK as u32);
             }
         }
         list.sort_unstable();
-        list.iter().zip(1..).for_each(|(&block, place)| self.0[block as usize] = place);
+        list.iter().for_each(|&block| self.0[block as usize] = false);
         Ok(list)
-    }
-
-    fn short(&self, j: u32) -> u16 {
-        let name = self.0[(j >> PLACE) as usize] - 1;
-        (name << PLACE | (j & (BLOCK as u32 - 1))) as u16
-    }
-
-    fn forget(&mut self, touched: &[u32]) {
-        touched.iter().for_each(|&block| self.0[block as usize] = 0);
     }
 }
 
@@ -79,15 +61,9 @@ impl Block {
         if col.len() > u32::MAX as usize {
             return Err(memory::no_memory::<(u32, f64)>("matrix", col.len()));
         }
-        let touches = seen.touched(col)?;
-        let columns = if touches.len() <= NAMES {
-            memory::collected("matrix columns", col.iter().map(|&j| seen.short(j))).map(Columns::Short)
-        } else {
-            memory::copied("matrix columns", col).map(Columns::Long)
-        };
-        seen.forget(&touches);
+        let touches = seen.touched(n, col)?;
         let coef = memory::copied("matrix coefficients", coef)?;
-        Ok(Block { first: b * BLOCK, start, columns: columns?, coef, touches })
+        Ok(Block { first: b * BLOCK, start, col: memory::copied("matrix columns", col)?, coef, touches })
     }
 
     fn len(&self) -> usize {
@@ -99,24 +75,6 @@ impl Block {
         (self.first + k, self.start[k] as usize..self.start[k + 1] as usize)
     }
 
-    /// The first particle of each block that a short column can name.
-    fn bases(&self) -> [usize; NAMES] {
-        let mut bases = [0; NAMES];
-        bases.iter_mut().zip(&self.touches).for_each(|(base, &block)| *base = block as usize * BLOCK);
-        bases
-    }
-
-    /// The column of a coefficient; the sums below decode whole rows.
-    fn column(&self, at: usize) -> usize {
-        match &self.columns {
-            Columns::Long(col) => col[at] as usize,
-            Columns::Short(col) => {
-                let c = col[at] as usize;
-                self.touches[c >> PLACE] as usize * BLOCK + c % BLOCK
-            }
-        }
-    }
-
     fn sums(
         &self,
         t: &[f64],
@@ -124,39 +82,32 @@ impl Block {
         finish: impl Fn(usize, f64) -> f64,
         g: impl Fn(usize, usize, f64) -> f64,
     ) {
-        match &self.columns {
-            Columns::Long(col) => self.sums_of(col, |j| j as usize, t, out, finish, g),
-            Columns::Short(col) => {
-                let bases = self.bases();
-                let index = |c: u16| bases[usize::from(c >> PLACE)] + usize::from(c) % BLOCK;
-                self.sums_of(col, index, t, out, finish, g);
-            }
-        }
-    }
-
-    fn sums_of<C: Copy>(
-        &self,
-        col: &[C],
-        index: impl Fn(C) -> usize + Copy,
-        t: &[f64],
-        out: &mut [f64],
-        finish: impl Fn(usize, f64) -> f64,
-        g: impl Fn(usize, usize, f64) -> f64,
-    ) {
         for (k, out) in out.iter_mut().enumerate() {
+            if let Some(&start) = self.start.get(k + AHEAD) {
+                prefetch(&self.coef, start as usize, self.row(k).1.len());
+                prefetch(&self.col, start as usize, self.row(k).1.len());
+            }
             let (i, range) = self.row(k);
-            let sum = row_sum(&col[range.clone()], &self.coef[range], t, t[i], index, |j, c| g(i, j, c));
-            *out = finish(i, sum);
+            *out = finish(i, row_sum(&self.col[range.clone()], &self.coef[range], t, t[i], |j, c| g(i, j, c)));
         }
     }
 
     fn bytes(&self) -> u64 {
-        let columns = match &self.columns {
-            Columns::Short(col) => memory::bytes(col),
-            Columns::Long(col) => memory::bytes(col),
-        };
-        columns + memory::bytes(&self.start) + memory::bytes(&self.coef) + memory::bytes(&self.touches)
+        memory::bytes(&self.start) + memory::bytes(&self.col) + memory::bytes(&self.coef) + memory::bytes(&self.touches)
     }
+}
+
+/// Asks the memory for `len` items from `at` on, without waiting.
+#[inline(always)]
+fn prefetch<T>(data: &[T], at: usize, len: usize) {
+    #[cfg(target_arch = "x86_64")]
+    for byte in (0..len * size_of::<T>()).step_by(64) {
+        use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+        // SAFETY: a prefetch reads nothing that the program can see, whatever the address.
+        unsafe { _mm_prefetch::<_MM_HINT_T0>(data.as_ptr().wrapping_add(at).cast::<i8>().wrapping_add(byte)) };
+    }
+    #[cfg(not(target_arch = "x86_64"))]
+    let _ = (data, at, len);
 }
 
 impl Matrix {
@@ -188,7 +139,7 @@ impl Matrix {
                 for k in 0..block.len() {
                     let (i, range) = block.row(k);
                     for at in range {
-                        block.coef[at] *= factor(i, block.column(at));
+                        block.coef[at] *= factor(i, block.col[at] as usize);
                     }
                 }
             }
@@ -237,7 +188,7 @@ impl Matrix {
                 let (i, range) = block.row(k);
                 let (mut absolute, mut signed) = (0.0f64, 0.0f64);
                 for at in range {
-                    let (j, c) = (block.column(at), block.coef[at]);
+                    let (j, c) = (block.col[at] as usize, block.coef[at]);
                     let g = kappa.map_or(c, |(mean, k)| c * mean.of(k[i], k[j]));
                     // An image of the particle itself exchanges nothing.
                     let g = if j == i { 0.0 } else { g };
@@ -285,19 +236,12 @@ fn is_quiet(levels: &[Option<f64>], block: usize, touches: &[u32]) -> bool {
     levels[block].is_some_and(|own| touches.iter().all(|&b| levels[b as usize] == Some(own)))
 }
 
-/// Σ g(b, c) (T_b − T_a) over a row, b = index(column) always being a particle of `t`. Four running sums: one would wait
+/// Σ g(b, c) (T_b − T_a) over a row, every column being a particle of `t`. Four running sums: one would wait
 /// for its own last addition at every neighbour.
 #[inline(always)]
-pub(super) fn row_sum<C: Copy>(
-    col: &[C],
-    coef: &[f64],
-    t: &[f64],
-    own: f64,
-    index: impl Fn(C) -> usize,
-    g: impl Fn(usize, f64) -> f64,
-) -> f64 {
-    let term = |c: C, coef: f64| {
-        let j = index(c);
+pub(super) fn row_sum(col: &[u32], coef: &[f64], t: &[f64], own: f64, g: impl Fn(usize, f64) -> f64) -> f64 {
+    let term = |j: u32, coef: f64| {
+        let j = j as usize;
         debug_assert!(j < t.len());
         // SAFETY: columns are below the number of particles where they are made, and t has one value for each.
         g(j, coef) * (unsafe { *t.get_unchecked(j) } - own)
@@ -345,15 +289,13 @@ mod tests {
     }
 
     #[test]
-    fn short_and_long_columns_give_the_sums_of_the_definition() {
-        for (blocks, short) in [(1, true), (NAMES, true), (NAMES + 6, false)] {
+    fn sums_are_those_of_the_definition() {
+        for blocks in [1, 2, 70] {
             let (mut matrix, t, sums) = random_matrix(blocks, 13);
-            assert!(matrix.blocks.iter().all(|b| matches!(b.columns, Columns::Short(_)) == short));
             let pool = Pool::new(2).unwrap();
             let mut out = vec![0.0; t.len()];
             matrix.apply(&pool, None, &t, &mut out, true, |_, s| s);
             assert_eq!(out, sums);
-            // Scaled by a power of two that depends on both ends, through the other way to read a column.
             matrix.scale(&pool, |a, b| if (a + b) % 2 == 0 { 2.0 } else { 4.0 });
             let kappa: Vec<f64> = (0..t.len()).map(|i| if i % 2 == 0 { 1.0 } else { 3.0 }).collect();
             let plain = matrix.circles(&pool, None).unwrap();

@@ -92,8 +92,8 @@ impl Assembly<'_> {
             coef.extend(self.coefficients(&row, w));
             let own = t[row.i];
             let sum = match kappa {
-                None => row_sum(row.j, coef, t, own, |j| j as usize, |_, c| c),
-                Some((mean, k)) => row_sum(row.j, coef, t, own, |j| j as usize, |j, c| c * mean.of(k[row.i], k[j])),
+                None => row_sum(row.j, coef, t, own, |_, c| c),
+                Some((mean, k)) => row_sum(row.j, coef, t, own, |j, c| c * mean.of(k[row.i], k[j])),
             };
             Ok(finish(row.i, sum))
         })

@@ -77,7 +77,7 @@ impl Plan {
         add(
             "weights",
             setup,
-            pairs * 10.0 + 4.0 * n,
+            pairs * 12.0 + 4.0 * n,
             pairs,
             format!("{} w_ab, {evaluations} per pair", facts.operator),
         );

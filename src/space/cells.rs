@@ -61,7 +61,7 @@ impl Cells {
         let level = level_of(h, self.h_max);
         let edge_shift = self.levels.first().map_or(0, |l| l.shift) as usize;
         let shift = edge_shift.saturating_sub(level) * cloud.dim();
-        (level, cloud.grid.key(cloud.position(i)) >> shift)
+        (level, cloud.keys[i] >> shift)
     }
 }
 
@@ -79,7 +79,7 @@ impl Level {
         let shift = (doublings.ceil().max(0.0) as u32).min(morton::bits(dim));
         let (mut keys, mut starts) = (Vec::new(), Vec::new());
         for (at, &i) in members.iter().enumerate() {
-            let key = cloud.grid.key(cloud.position(i as usize)) >> (shift as usize * dim).min(63);
+            let key = cloud.keys[i as usize] >> (shift as usize * dim).min(63);
             if keys.last() != Some(&key) {
                 if keys.len() == keys.capacity() {
                     let more = keys.len().max(64);

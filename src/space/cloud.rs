@@ -18,6 +18,8 @@ pub struct Cloud {
     pub x: Axes<Vec<f64>>,
     /// `host[i]` is the host's index of internal particle i.
     pub host: Vec<u32>,
+    /// The Morton key of each particle's finest cell.
+    pub keys: Vec<u64>,
     pub grid: Grid,
 }
 
@@ -95,6 +97,7 @@ impl Cloud {
             order.sort_unstable_by(compare);
         }
         let host = memory::collected("order", order.iter().map(|item| item.1))?;
+        let keys = memory::collected("keys", order.iter().map(|item| item.0))?;
         let mut axes = [const { Vec::new() }; 3];
         for (axis, values) in axes.iter_mut().enumerate().take(domain.dim) {
             *values = memory::filled("positions", host.len(), 0.0)?;
@@ -104,7 +107,7 @@ impl Cloud {
                 }
             });
         }
-        Ok(Cloud { domain: domain.clone(), x: axes, host, grid })
+        Ok(Cloud { domain: domain.clone(), x: axes, host, keys, grid })
     }
 
     pub fn len(&self) -> usize {
@@ -141,7 +144,7 @@ impl Cloud {
 
     /// Bytes held.
     pub fn bytes(&self) -> u64 {
-        self.x.iter().map(memory::bytes).sum::<u64>() + memory::bytes(&self.host)
+        self.x.iter().map(memory::bytes).sum::<u64>() + memory::bytes(&self.host) + memory::bytes(&self.keys)
     }
 }
 

@@ -152,7 +152,7 @@ fn solve_open(kernel: &Kernel, target: f64, rows: &Rows, mass: &[f64], pool: &Po
 /// A first guess: h_fac times the spacing in the smallest Morton cell around a particle that holds a crowd.
 fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
     let dim = cloud.dim();
-    let keys = memory::collected("keys", (0..cloud.len()).map(|i| cloud.grid.key(cloud.position(i))))?;
+    let keys = &cloud.keys;
     let crowd = CROWD.min(cloud.len());
     let bits = super::morton::bits(dim);
     let spacing = |i: usize| {
