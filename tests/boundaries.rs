@@ -177,6 +177,21 @@ fn a_lone_particle_radiates_into_the_cold() {
 }
 
 #[test]
+fn radiation_needs_absolute_temperatures_and_convection_does_not() {
+    let x = row(10, 0);
+    let mut s = slab("kernel=M4", &x, 10);
+    for (name, value) in [("h_conv", 1.0), ("T_ambient", -20.0)] {
+        s.set_number(name, value).unwrap();
+    }
+    s.step(1.0).unwrap();
+    s.set_number("emissivity", 0.5).unwrap();
+    let before = s.get_all("T").unwrap();
+    let e = s.step(1.0).unwrap_err();
+    assert!(e.name() == "BAD_VALUE" && e.to_string().contains("absolute"), "{e}");
+    assert_eq!(bits(&before), bits(&s.get_all("T").unwrap()));
+}
+
+#[test]
 fn a_source_callback_sees_time_temperature_and_the_hosts_numbers() {
     let x = lattice(10, 2, 0.3);
     let mut s = unit_box("kernel=M4 integrator=rk4", &x, 2, true);

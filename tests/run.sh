@@ -4,6 +4,17 @@
 set -eu
 cd "$(dirname "$0")/.."
 
+# Registries have bad minutes: tries again, a minute apart.
+patiently() {
+    tries=0
+    until "$@"; do
+        tries=$((tries + 1))
+        [ "$tries" -lt 15 ] || return 1
+        echo "failed, trying again in a minute: $*" >&2
+        sleep 60
+    done
+}
+
 missing=""
 need() { # command, Debian package
     command -v "$1" >/dev/null 2>&1 || missing="$missing $2"
@@ -33,11 +44,17 @@ if [ -z "${DIFFUSPH_PYTHON:-}" ]; then
     python=target/venv/bin/python
     if ! "$python" -c 'import meshio, vtk, pyvista, numpy' 2>/dev/null; then
         python3 -m venv target/venv
-        "$python" -m pip install --quiet meshio==5.3.5 vtk pyvista numpy
+        if ! patiently "$python" -m pip install --quiet meshio==5.3.5 vtk pyvista numpy; then
+            echo "missing: meshio, vtk, pyvista and numpy could not be installed into target/venv." >&2
+            echo "Set DIFFUSPH_PYTHON to a Python that has them, or run this again when PyPI answers." >&2
+            exit 1
+        fi
     fi
     DIFFUSPH_PYTHON="$PWD/$python"
     export DIFFUSPH_PYTHON
 fi
 
+export CARGO_NET_RETRY=10
+patiently cargo fetch --locked
 cargo build --locked --all-features
 cargo test --locked --all-features "$@"

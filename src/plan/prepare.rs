@@ -217,6 +217,12 @@ impl State {
             return Ok(());
         }
         let value = |slot: Slot, i: usize| self.inputs[slot].at(i).unwrap_or(0.0);
+        for i in (0..self.len()).filter(|&i| value(fields::EMISSIVITY, i) > 0.0) {
+            if let Some(slot) = [fields::T, fields::T_AMBIENT].into_iter().find(|&slot| value(slot, i) < 0.0) {
+                let rule = "radiation needs absolute temperatures; set emissivity = 0 or temperatures in kelvin";
+                return Err(Error::bad_at(FIELDS[slot].name, self.host(i), value(slot, i), rule));
+            }
+        }
         let exchange = |i: usize| Exchange {
             area: self.area(i),
             flux_in: value(fields::FLUX_IN, i),

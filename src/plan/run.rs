@@ -126,7 +126,7 @@ impl State {
     }
 
     /// The host's number of a particle.
-    fn host(&self, i: usize) -> usize {
+    pub fn host(&self, i: usize) -> usize {
         self.cloud.as_ref().map_or(i, |c| c.host[i] as usize)
     }
 
