@@ -55,6 +55,6 @@ if [ -z "${DIFFUSPH_PYTHON:-}" ]; then
 fi
 
 export CARGO_NET_RETRY=10
-patiently cargo fetch --locked
+patiently cargo fetch --locked --target "$(rustc -vV | sed -n "s/^host: //p")"
 cargo build --locked --all-features
 cargo test --locked --all-features "$@"

@@ -9,10 +9,11 @@ pub mod density;
 pub mod domain;
 pub mod morton;
 pub mod rows;
+mod scratch;
 
 pub use cloud::Cloud;
 pub use domain::Domain;
-pub use rows::{Row, Scratch};
+pub use scratch::{Row, Scratch};
 
 /// At most 3 dimensions; unused axes are empty.
 pub type Axes<T> = [T; 3];

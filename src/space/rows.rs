@@ -5,32 +5,10 @@
 //! (x_a − x_b) − shift.
 
 use super::cells::Cells;
-use super::{Axes, Cloud};
+use super::{Axes, Cloud, Row, Scratch};
 use crate::error::Result;
-use crate::memory;
 use crate::pool::{BLOCK, Pool};
 use std::ops::Range;
-
-/// The neighbours of particle `i`, itself excluded (its periodic images included), in a fixed order.
-pub struct Row<'a> {
-    pub i: usize,
-    /// Internal indices of the neighbours.
-    pub j: &'a [u32],
-    /// Distances.
-    pub r: &'a [f64],
-    /// r_b − r_a by axis; axes beyond `dim` are empty.
-    pub d: Axes<&'a [f64]>,
-}
-
-impl Row<'_> {
-    pub fn len(&self) -> usize {
-        self.j.len()
-    }
-
-    pub fn is_empty(&self) -> bool {
-        self.j.is_empty()
-    }
-}
 
 /// A neighbour search over a cloud: cells plus the smoothing lengths they were made for.
 pub struct Rows<'a> {
@@ -38,20 +16,6 @@ pub struct Rows<'a> {
     pub h: &'a [f64],
     pub radius: f64,
     cells: Cells,
-}
-
-/// Buffers of one worker, reused from row to row.
-#[derive(Default)]
-pub struct Scratch {
-    j: Vec<u32>,
-    x: Axes<Vec<f64>>,
-    shift: Axes<Vec<f64>>,
-    cut2: Vec<f64>,
-    r2: Vec<f64>,
-    hits: Vec<u32>,
-    row_j: Vec<u32>,
-    row_r: Vec<f64>,
-    row_d: Axes<Vec<f64>>,
 }
 
 impl<'a> Rows<'a> {
@@ -151,9 +115,9 @@ impl<'a> Rows<'a> {
             let end = (start + 1..range.end).find(|&i| group_of(i) != group).unwrap_or(range.end);
             let shifted = if (start..end).any(&wanted) { self.gather(start..end, s)? } else { false };
             for i in (start..end).filter(|&i| wanted(i)) {
-                let n = if shifted { self.hits::<D, true>(i, s)? } else { self.hits::<D, false>(i, s)? };
-                let d = [0, 1, 2].map(|a| if a < D { &s.row_d[a][..n] } else { &[] });
-                visit(Row { i, j: &s.row_j[..n], r: &s.row_r[..n], d });
+                let centre: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
+                let reach = self.radius * self.h[i];
+                visit(s.near(i, centre, reach * reach, shifted)?);
             }
             start = end;
         }
@@ -166,7 +130,7 @@ impl<'a> Rows<'a> {
         let (lo, hi) = self.extent(group.clone());
         let h_group = self.h[group].iter().copied().fold(0.0, f64::max);
         let same_h = self.cells.same_h;
-        s.clear_candidates();
+        s.clear();
         let (mut shifted, mut failed) = (false, Ok(()));
         let lengths = (!same_h).then_some((self.h, self.radius));
         for level in &self.cells.levels {
@@ -186,7 +150,7 @@ impl<'a> Rows<'a> {
             }
             self.for_images(from, to, |shift, from, to| {
                 level.overlapping(self.cloud, from, to, |cell| {
-                    let added = s.add_candidates(self.cloud, cell, shifted.then_some(shift), lengths);
+                    let added = s.add(self.cloud, cell, shifted.then_some(shift), lengths);
                     if added.is_err() {
                         failed = added;
                     }
@@ -220,161 +184,6 @@ impl<'a> Rows<'a> {
                 }
             }
         }
-    }
-
-    /// Fills the scratch row with the candidates that are within reach of particle i; returns how many.
-    fn hits<const D: usize, const SHIFTED: bool>(&self, i: usize, s: &mut Scratch) -> Result<usize> {
-        s.reserve_row(s.j.len(), D)?;
-        let centre: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
-        let reach = self.radius * self.h[i];
-        let own = reach * reach;
-        #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: this processor has AVX2.
-            return Ok(unsafe { s.select_avx2::<D, SHIFTED>(i, centre, own, self.cells.same_h) });
-        }
-        Ok(s.select::<D, SHIFTED>(i, centre, own, self.cells.same_h))
-    }
-}
-
-impl Scratch {
-    #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn select_avx2<const D: usize, const SHIFTED: bool>(
-        &mut self,
-        i: usize,
-        centre: [f64; D],
-        own: f64,
-        same_h: bool,
-    ) -> usize {
-        self.select::<D, SHIFTED>(i, centre, own, same_h)
-    }
-
-    /// Moves the candidates with r² < max(own, cut2) into the row. No closures here: they would be compiled once,
-    /// without the caller's processor features.
-    #[inline(always)]
-    fn select<const D: usize, const SHIFTED: bool>(
-        &mut self,
-        i: usize,
-        centre: [f64; D],
-        own: f64,
-        same_h: bool,
-    ) -> usize {
-        let n = self.j.len();
-        let (r2, hits) = (&mut self.r2[..n], &mut self.hits[..n]);
-        r2.fill(0.0);
-        for (a, centre) in centre.iter().enumerate() {
-            let x = &self.x[a][..n];
-            if SHIFTED {
-                for ((r2, x), shift) in r2.iter_mut().zip(x).zip(&self.shift[a][..n]) {
-                    let d = (x - centre) + shift;
-                    *r2 += d * d;
-                }
-            } else {
-                for (r2, x) in r2.iter_mut().zip(x) {
-                    let d = x - centre;
-                    *r2 += d * d;
-                }
-            }
-        }
-        // Every candidate is written, and the end moves on only for a hit: no branch to mispredict.
-        let mut found = 0;
-        for (c, r2) in r2.iter().enumerate() {
-            let cut2 = if same_h { own } else { own.max(self.cut2[c]) };
-            // SAFETY: found <= c < n, the length of hits.
-            unsafe { *hits.get_unchecked_mut(found) = c as u32 };
-            found += usize::from(*r2 < cut2);
-        }
-        self.fill_row::<D, SHIFTED>(i, centre, found)
-    }
-
-    #[inline(always)]
-    fn fill_row<const D: usize, const SHIFTED: bool>(&mut self, i: usize, centre: [f64; D], found: usize) -> usize {
-        let mut len = 0;
-        for k in 0..found {
-            // The particle itself is a candidate too, but not its own neighbour; its images are.
-            let c = self.hits[k] as usize;
-            let mut here = self.j[c] as usize == i;
-            for a in 0..D {
-                here &= !SHIFTED || self.shift[a][c] == 0.0;
-            }
-            self.hits[len] = c as u32;
-            len += usize::from(!here);
-        }
-        let hits = &self.hits[..len];
-        for (j, &c) in self.row_j[..len].iter_mut().zip(hits) {
-            *j = self.j[c as usize];
-        }
-        for (r, &c) in self.row_r[..len].iter_mut().zip(hits) {
-            *r = self.r2[c as usize];
-        }
-        for r in &mut self.row_r[..len] {
-            *r = r.sqrt();
-        }
-        for a in 0..D {
-            let (x, shift) = (&self.x[a], &self.shift[a]);
-            for (d, &c) in self.row_d[a][..len].iter_mut().zip(hits) {
-                let apart = x[c as usize] - centre[a];
-                *d = if SHIFTED { apart + shift[c as usize] } else { apart };
-            }
-        }
-        len
-    }
-
-    fn clear_candidates(&mut self) {
-        self.j.clear();
-        self.cut2.clear();
-        self.x.iter_mut().chain(&mut self.shift).for_each(Vec::clear);
-    }
-
-    fn add_zero_shifts(&mut self) -> Result<()> {
-        let n = self.j.len();
-        for shift in &mut self.shift {
-            shift.try_reserve(n).map_err(|_| memory::no_memory::<f64>("neighbour candidates", n))?;
-            shift.resize(n, 0.0);
-        }
-        Ok(())
-    }
-
-    /// `shift`: where some candidates are images; `lengths`: smoothing lengths and kernel radius, where they differ.
-    fn add_candidates(
-        &mut self,
-        cloud: &Cloud,
-        cell: &[u32],
-        shift: Option<Axes<f64>>,
-        lengths: Option<(&[f64], f64)>,
-    ) -> Result<()> {
-        let failed = |_| memory::no_memory::<f64>("neighbour candidates", cell.len());
-        self.j.try_reserve(cell.len()).map_err(failed)?;
-        self.j.extend_from_slice(cell);
-        for (a, x) in self.x.iter_mut().enumerate().take(cloud.dim()) {
-            x.try_reserve(cell.len()).map_err(failed)?;
-            x.extend(cell.iter().map(|&j| cloud.x[a][j as usize]));
-        }
-        for (all, by) in self.shift.iter_mut().zip(shift.iter().flatten()) {
-            all.try_reserve(cell.len()).map_err(failed)?;
-            all.resize(all.len() + cell.len(), *by);
-        }
-        if let Some((h, radius)) = lengths {
-            self.cut2.try_reserve(cell.len()).map_err(failed)?;
-            self.cut2.extend(cell.iter().map(|&j| (radius * h[j as usize]).powi(2)));
-        }
-        Ok(())
-    }
-
-    fn reserve_row(&mut self, n: usize, dim: usize) -> Result<()> {
-        fn grow<T: Clone + Default>(v: &mut Vec<T>, n: usize) -> Result<()> {
-            if n > v.len() {
-                v.try_reserve(n - v.len()).map_err(|_| memory::no_memory::<T>("a row of neighbours", n))?;
-                v.resize(n, T::default());
-            }
-            Ok(())
-        }
-        grow(&mut self.r2, n)?;
-        grow(&mut self.hits, n)?;
-        grow(&mut self.row_j, n)?;
-        grow(&mut self.row_r, n)?;
-        self.row_d.iter_mut().take(dim).try_for_each(|d| grow(d, n))
     }
 }
 
