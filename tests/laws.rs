@@ -278,6 +278,39 @@ fn few_lonely_and_coincident_particles() {
 }
 
 #[test]
+fn weights_that_do_not_fit_are_refused() {
+    // All in one place: every pair is one of neighbours.
+    let n = 4000;
+    let x = vec![0.5; n];
+    let mut s = unit_box("kernel=M4 memory=1e8", &x, 1, false);
+    s.set_number("h", 0.1).unwrap();
+    s.set_number("T", 1.0).unwrap();
+    let e = s.step(1.0).unwrap_err();
+    assert!(e.name() == "NO_MEMORY" && e.to_string().contains("4000 particles"), "{e}");
+}
+
+#[test]
+fn density_follows_moving_particles() {
+    // The lengths found last are a start, not an answer: after a move the answer is that of a new solver.
+    let x = lattice(12, 3, 0.3);
+    let moved: Vec<f64> = x.iter().map(|x| (x + 0.02 * (9.0 * x).sin()).clamp(0.0, 0.999)).collect();
+    let lengths = |clouds: &[&[f64]]| {
+        let mut s = Solver::new("heat dim=3 kernel=M4").unwrap();
+        s.set_box(&[0.0; 3], &[1.0; 3], &[true; 3]).unwrap();
+        let mut h = Vec::new();
+        for x in clouds {
+            s.set_particles(Strided::new("x", x, x.len() / 3, 3, 3).unwrap()).unwrap();
+            s.set_number("m", 1.0).unwrap();
+            h = s.get_all("h").unwrap();
+        }
+        h
+    };
+    // Both are solved to 1e-14.
+    assert!(l2(&lengths(&[&x, &moved]), &lengths(&[&moved])) < 1e-13);
+    assert!(l2(&lengths(&[&moved]), &lengths(&[&x])) > 1e-3);
+}
+
+#[test]
 fn a_step_is_exactly_dt_and_a_wrong_one_changes_nothing() {
     let x = lattice(64, 1, 0.2);
     for integrator in names("integrators") {

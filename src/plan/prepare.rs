@@ -75,9 +75,7 @@ impl State {
         let start = std::time::Instant::now();
         if self.inputs[fields::H] == Input::Unset && self.inputs[fields::RHO] == Input::Unset {
             // h is not known before the search that finds it: sort on the finest grid, find h, sort again.
-            let m = self.each(fields::M)?;
-            let cloud = self.cloud(call)?;
-            let h = density::smoothing_lengths(&self.choices.kernel, self.choices.h_fac, cloud, &m, &self.pool)?;
+            let h = self.find_lengths(call)?;
             self.inputs[fields::H] = Input::Each(h);
             let made = self.make_geometry(call);
             self.inputs[fields::H] = Input::Unset;
@@ -88,6 +86,22 @@ impl State {
             self.timers.add("sort", start.elapsed());
         }
         Ok(())
+    }
+
+    /// h together with rho, from the lengths found last where there are any.
+    fn find_lengths(&mut self, call: &str) -> Result<Vec<f64>> {
+        let m = self.each(fields::M)?;
+        let cloud = self.cloud(call)?;
+        let last = |&host: &u32| self.last_h[host as usize];
+        let start = match self.last_h.len() == cloud.len() {
+            true => memory::collected("h", cloud.host.iter().map(last))?,
+            false => density::guess(cloud, self.choices.h_fac)?,
+        };
+        let h = density::smoothing_lengths(&self.choices.kernel, self.choices.h_fac, cloud, &m, start, &self.pool)?;
+        let mut by_host = memory::filled("h", cloud.len(), 0.0)?;
+        cloud.host.iter().zip(&h).for_each(|(&host, &h)| by_host[host as usize] = h);
+        self.last_h = by_host;
+        Ok(h)
     }
 
     fn make_geometry(&mut self, call: &str) -> Result<Geometry> {

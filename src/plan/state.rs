@@ -94,6 +94,8 @@ pub struct State {
     pub cancel: Arc<AtomicBool>,
 
     pub geometry: Option<Geometry>,
+    /// The smoothing lengths found last, in the host's order: where particles move a little, the next are near.
+    pub last_h: Vec<f64>,
     pub weights: Option<Weights>,
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
@@ -124,6 +126,7 @@ impl State {
             progress: None,
             cancel: Arc::default(),
             geometry: None,
+            last_h: Vec::new(),
             weights: None,
             inverse_capacity: None,
             surface: None,
@@ -356,6 +359,12 @@ impl State {
         let weights = self.weights.as_ref().map_or(0, |w| w.matrix.bytes() + memory::bytes(&w.moments));
         let inputs: u64 = self.inputs.iter().map(Input::bytes).sum();
         let capacity = self.inverse_capacity.as_ref().map_or(0, memory::bytes);
-        self.cloud.as_ref().map_or(0, Cloud::bytes) + geometry + weights + inputs + capacity + self.work.bytes()
+        self.cloud.as_ref().map_or(0, Cloud::bytes)
+            + geometry
+            + weights
+            + inputs
+            + capacity
+            + memory::bytes(&self.last_h)
+            + self.work.bytes()
     }
 }

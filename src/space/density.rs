@@ -20,6 +20,8 @@ const ACCURACY: f64 = 1e-14;
 const NEWTON: usize = 100;
 /// How much a smoothing length that found too few neighbours is enlarged before the next search.
 const GROWTH: f64 = 1.4;
+/// And how much wider than the start the first search is.
+const MARGIN: f64 = 1.1;
 const SEARCHES: usize = 60;
 /// Particles in the Morton cell that gives the first guess of the spacing.
 const CROWD: usize = 8;
@@ -95,13 +97,22 @@ pub fn omega(kernel: &Kernel, rows: &Rows, mass: &[f64], pool: &Pool) -> Result<
     Ok(omega)
 }
 
-/// The smoothing length of each particle that satisfies h = h_fac (m/rho)^(1/nu) together with the density sum.
+/// The smoothing length of each particle that satisfies h = h_fac (m/rho)^(1/nu) together with the density sum, searched
+/// for from `start` on.
 ///
 /// # Errors
 /// `BadElement` naming h of a particle for which no length has enough neighbours; `BoxTooSmall`; `NoMemory`.
-pub fn smoothing_lengths(kernel: &Kernel, h_fac: f64, cloud: &Cloud, mass: &[f64], pool: &Pool) -> Result<Vec<f64>> {
+pub fn smoothing_lengths(
+    kernel: &Kernel,
+    h_fac: f64,
+    cloud: &Cloud,
+    mass: &[f64],
+    start: Vec<f64>,
+    pool: &Pool,
+) -> Result<Vec<f64>> {
     let target = h_fac.powi(kernel.dim() as i32);
-    let mut tried = guess(cloud, h_fac)?;
+    let mut tried = start;
+    tried.iter_mut().for_each(|h| *h *= MARGIN);
     let mut h = memory::filled("h", cloud.len(), 0.0)?;
     for _ in 0..SEARCHES {
         let rows = Rows::new(cloud, &tried, kernel.radius(), pool)?;
@@ -150,7 +161,7 @@ fn solve_open(kernel: &Kernel, target: f64, rows: &Rows, mass: &[f64], pool: &Po
 }
 
 /// A first guess: h_fac times the spacing in the smallest Morton cell around a particle that holds a crowd.
-fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
+pub fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
     let dim = cloud.dim();
     let keys = &cloud.keys;
     let crowd = CROWD.min(cloud.len());
@@ -172,7 +183,7 @@ fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
         cloud.grid.edge * 2f64.powi(low as i32) / (count(low) as f64).powf(1.0 / dim as f64)
     };
     let least = extent(cloud) * 1e-12;
-    memory::collected("h", (0..cloud.len()).map(|i| (1.1 * h_fac * spacing(i)).max(least).max(f64::MIN_POSITIVE)))
+    memory::collected("h", (0..cloud.len()).map(|i| (h_fac * spacing(i)).max(least).max(f64::MIN_POSITIVE)))
 }
 
 fn extent(cloud: &Cloud) -> f64 {
@@ -215,7 +226,15 @@ mod tests {
                     Cloud::sort(&domain, Strided::new("x", &x, particles, dim, dim).unwrap(), 0.0, &pool).unwrap();
                 // Unequal masses: N(h) weighs neighbours by their mass.
                 let mass: Vec<f64> = (0..particles).map(|i| 1.0 + 0.3 * ((i % 7) as f64)).collect();
-                let h = smoothing_lengths(&kernel, kernel.h_fac(), &cloud, &mass, &pool).unwrap();
+                let h = smoothing_lengths(
+                    &kernel,
+                    kernel.h_fac(),
+                    &cloud,
+                    &mass,
+                    guess(&cloud, kernel.h_fac()).unwrap(),
+                    &pool,
+                )
+                .unwrap();
                 let rows = Rows::new(&cloud, &h, kernel.radius(), &pool).unwrap();
                 let rho = sum(&kernel, &rows, &mass, &pool).unwrap();
                 for i in 0..particles {
@@ -257,7 +276,7 @@ mod tests {
         let kernel = Kernel::new("M4", 1).unwrap();
         let solve = |x: &[f64]| {
             let cloud = Cloud::sort(&Domain::open(1), Strided::packed(x), 0.0, &pool).unwrap();
-            smoothing_lengths(&kernel, 1.2, &cloud, &vec![1.0; x.len()], &pool)
+            smoothing_lengths(&kernel, 1.2, &cloud, &vec![1.0; x.len()], guess(&cloud, 1.2).unwrap(), &pool)
         };
         let mut x: Vec<f64> = (0..100).map(|i| f64::from(i) * 1e-6).collect();
         x.push(1e3);
