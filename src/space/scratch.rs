@@ -121,10 +121,10 @@ impl Scratch {
         for r in &mut self.row_r[..len] {
             *r = r.sqrt();
         }
-        for a in 0..D {
+        for (a, centre) in centre.iter().enumerate() {
             let (x, shift) = (&self.x[a], &self.shift[a]);
             for (d, &c) in self.row_d[a][..len].iter_mut().zip(hits) {
-                let apart = x[c as usize] - centre[a];
+                let apart = x[c as usize] - centre;
                 *d = if SHIFTED { apart + shift[c as usize] } else { apart };
             }
         }
