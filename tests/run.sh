@@ -33,8 +33,8 @@ if [ -n "$missing" ]; then
     as_root=""
     [ "$(id -u)" -eq 0 ] || as_root="sudo -n"
     echo "installing:$missing"
-    # shellcheck disable=SC2086 # the packages are words
-    if ! { $as_root apt-get update -qq && DEBIAN_FRONTEND=noninteractive $as_root apt-get install -y -qq $missing; } >/dev/null; then
+    install="$as_root apt-get update -qq && DEBIAN_FRONTEND=noninteractive $as_root apt-get install -y -qq $missing"
+    if ! command -v apt-get >/dev/null 2>&1 || ! $as_root true || ! patiently sh -c "$install >/dev/null"; then
         echo "missing:$missing. Install these packages with your system's package manager, then run this again." >&2
         exit 1
     fi
