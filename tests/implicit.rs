@@ -30,18 +30,16 @@ fn bounds_and_energy_are_kept_at_any_step() {
                 let drift = report.energy / report.energy_before - 1.0;
                 // Rounding of the two sums.
                 assert!(drift.abs() < 1e-12, "{method} {stiffness} {tolerance}: {drift:e}");
-                println!("{method} {tolerance} R = {stiffness}: {} applications", report.applications);
                 if method == "backward-euler" {
                     // The promise: no further outside than the residual, which is relative to a change of at most 9.9
                     // and, at R = 1e6, rounded at 4 eps (1 + 1e6) 10.
                     let slack = 2.0 * (9.9 * tolerance + 4.0 * f64::EPSILON * stiffness * 10.0) + 1e-12;
                     let outside = (0.1 - report.t_min).max(report.t_max - 10.0);
-                    println!("    outside by {outside:e}");
                     assert!(outside <= slack, "{stiffness} {tolerance}: {outside:e} {slack:e}");
                 }
                 if stiffness == 1e6 && method != "crank-nicolson" && tolerance < 1e-2 {
-                    // The slowest wave is damped by 1/(1 + 40 dt/c_v), squared for sdirk2 by a small factor.
-                    assert!(report.t_max - report.t_min < 0.1 * 9.9, "{method}: {}", report.t_max - report.t_min);
+                    // The slowest wave decays at 20 or faster and the step is some 60 long: one over a thousand is left.
+                    assert!(report.t_max - report.t_min < 0.01 * 9.9, "{method}: {}", report.t_max - report.t_min);
                 }
             }
         }
@@ -163,9 +161,26 @@ fn conductivity_that_depends_on_temperature() {
 }
 
 #[test]
+fn stiffness_costs_iterations_until_heat_has_crossed_the_box() {
+    let x = lattice(16, 3, 0.2);
+    let mut last = 0;
+    for stiffness in [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6] {
+        let words = "kernel=M4 integrator=backward-euler solver_tolerance=1e-8";
+        let mut s = unit_box(words, &x, 3, true);
+        set(&mut s, "T", &field(&x, 3, |p| if p.iter().all(|c| (c - 0.5).abs() < 0.25) { 10.0 } else { 0.1 }));
+        let limit = s.limit().unwrap();
+        let applications = s.step(stiffness * limit).unwrap().applications;
+        println!("R = {stiffness}: {applications}");
+        // More work for a stiffer step, but never what an explicit method would need.
+        assert!(applications >= last && applications < 250, "{stiffness}: {applications}");
+        last = applications;
+    }
+}
+
+#[test]
 fn an_unsolved_step_changes_nothing() {
     for method in METHODS {
-        let mut s = disc(&format!("integrator={method} max_iterations=5"));
+        let mut s = disc(&format!("integrator={method} max_iterations=12"));
         let before = bits(&s.get_all("T").unwrap());
         let limit = s.limit().unwrap();
         let e = s.step(1e4 * limit).unwrap_err();
