@@ -331,7 +331,10 @@ fn a_step_is_exactly_dt_and_a_wrong_one_changes_nothing() {
             assert_eq!(s.step(dt).unwrap_err().name(), "BAD_VALUE");
         }
         let huge = s.step(1e30 * limit).unwrap_err();
-        assert_eq!(huge.name(), "STEP_TOO_LARGE", "{integrator}: {huge}");
+        // Implicit methods take any step that double precision can resolve: to some 1e14 limits.
+        let implicit = ["backward-euler", "crank-nicolson", "sdirk2"].contains(&integrator.as_str());
+        let expected = if implicit { "NOT_CONVERGED" } else { "STEP_TOO_LARGE" };
+        assert_eq!(huge.name(), expected, "{integrator}: {huge}");
         assert_eq!((bits(&s.get_all("T").unwrap()), s.get_number("time").unwrap()), (before, time));
     }
 }

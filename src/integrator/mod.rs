@@ -1,19 +1,52 @@
-//! Advancing dy/dt = rate(t, y) by explicit and stabilised Runge-Kutta methods: a table of methods, the schedule of
-//! sub-steps and stages that a step needs, and the sub-step itself. What y is, the integrator does not know.
+//! Advancing dy/dt = rate(t, y) by explicit, stabilised and implicit Runge-Kutta methods: a table of methods, the
+//! schedule of sub-steps and stages that a step needs, and the sub-step itself. What y is, the integrator does not know.
 
 mod explicit;
+mod implicit;
+mod krylov;
 mod stabilised;
 
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::Pool;
 use explicit::Tableau;
+pub use krylov::Limits;
 use stabilised::Recursion;
 
 /// What an integrator advances: dy/dt = rate(t, y).
 pub trait System {
     /// Writes the rate at (t, y) to `dy`, which has the length of `y` and holds nothing of use before.
     fn rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<()>;
+
+    /// For implicit methods: fixes a linear operator A with rate(t, y + d) ≈ rate(t, y) + A d, after a call of `rate`
+    /// with the same arguments. Writes −diag A, and the weights of the inner product Σ weight x y in which A is
+    /// self-adjoint and has no positive eigenvalue; 0 for what does not move.
+    fn linearise(&mut self, _t: f64, _y: &[f64], _diagonal: &mut [f64], _weight: &mut [f64]) -> Result<Linear> {
+        Ok(Linear::Unknown)
+    }
+
+    /// Writes A x to `ax`, with A as `linearise` fixed it.
+    fn apply(&mut self, _x: &[f64], ax: &mut [f64]) -> Result<()> {
+        ax.fill(0.0);
+        Ok(())
+    }
+
+    /// Σ weight rate(t, y), where all but a few terms of the rate are exchanges that add up to nothing, from those few:
+    /// implicit methods then keep the sum to rounding. `None` where there is no such law.
+    fn supply(&mut self, _t: f64, _y: &[f64]) -> Result<Option<f64>> {
+        Ok(None)
+    }
+}
+
+/// What a system knows of its linear part.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Linear {
+    /// Nothing: implicit methods cannot advance it.
+    Unknown,
+    /// The rate is linear in y, and this is its operator.
+    Exact,
+    /// The operator changes with y.
+    Frozen,
 }
 
 /// One row of [`METHODS`].
@@ -23,7 +56,7 @@ pub struct Method {
     pub about: &'static str,
     pub order: u32,
     /// The strong-stability coefficient: steps within `ssp / Bounds::diagonal` are convex combinations of Euler steps
-    /// that keep the maximum principle. Zero: the method promises no such thing at any step.
+    /// that keep the maximum principle; infinite where all steps do. Zero: the method promises no such thing at any step.
     pub ssp: f64,
     family: Family,
 }
@@ -32,6 +65,7 @@ pub struct Method {
 enum Family {
     Explicit(&'static Tableau),
     Stabilised(&'static Recursion),
+    Implicit(&'static implicit::Tableau),
 }
 
 /// Every integrator of this room.
@@ -78,6 +112,27 @@ pub static METHODS: &[Method] = &[
         ssp: 0.0,
         family: Family::Stabilised(&stabilised::RKL2),
     },
+    Method {
+        name: "backward-euler",
+        about: "implicit, one solve, order 1, L-stable; keeps the maximum principle at any dt, to the solver's tolerance",
+        order: 1,
+        ssp: f64::INFINITY,
+        family: Family::Implicit(&implicit::BACKWARD_EULER),
+    },
+    Method {
+        name: "crank-nicolson",
+        about: "implicit, one solve, order 2; large steps leave short waves ringing (Crank & Nicolson 1947)",
+        order: 2,
+        ssp: 0.0,
+        family: Family::Implicit(&implicit::CRANK_NICOLSON),
+    },
+    Method {
+        name: "sdirk2",
+        about: "implicit, two solves, order 2, L-stable, gamma = 1 - 1/sqrt(2) (Alexander 1977)",
+        order: 2,
+        ssp: 0.0,
+        family: Family::Implicit(&implicit::SDIRK2),
+    },
 ];
 
 /// The method of this name, in either case, or an error that lists the known ones.
@@ -108,15 +163,24 @@ pub struct Options {
     pub keep_bounds: bool,
     /// Most applications of the operator in one step.
     pub max_applications: u64,
+    /// How far an implicit method solves its equations.
+    pub limits: Limits,
 }
 
 impl Default for Options {
     fn default() -> Options {
-        Options { stages: None, max_stages: stabilised::MAX_STAGES, keep_bounds: false, max_applications: 1_000_000 }
+        Options {
+            stages: None,
+            max_stages: stabilised::MAX_STAGES,
+            keep_bounds: false,
+            max_applications: 1_000_000,
+            limits: Limits::default(),
+        }
     }
 }
 
-/// How a step is taken: `substeps` equal sub-steps of `dt`, each with `stages` applications of the operator.
+/// How a step is taken: `substeps` equal sub-steps of `dt`, each with `stages` applications of the operator
+/// (implicit methods: solves).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Schedule {
     pub substeps: u64,
@@ -125,6 +189,7 @@ pub struct Schedule {
     pub dt: f64,
     /// The whole step, as asked for.
     pub total: f64,
+    pub limits: Limits,
 }
 
 impl Schedule {
@@ -151,9 +216,9 @@ impl Method {
                 return Err(Error::bad(what, value, "it must be finite and not negative"));
             }
         }
-        let most = self.most_stages(options)?;
+        let (most, limits) = (self.most_stages(options)?, options.limits);
         if dt == 0.0 {
-            return Ok(Schedule { substeps: 0, stages: most, dt: 0.0, total: 0.0 });
+            return Ok(Schedule { substeps: 0, stages: most, dt: 0.0, total: 0.0, limits });
         }
         let mut needed = dt * (bounds.spectral / self.interval(most));
         if options.keep_bounds && self.ssp > 0.0 {
@@ -168,7 +233,7 @@ impl Method {
             let needed = applications as u64;
             return Err(Error::StepTooLarge { dt, needed, allowed: options.max_applications });
         }
-        Ok(Schedule { substeps: substeps as u64, stages, dt: part, total: dt })
+        Ok(Schedule { substeps: substeps as u64, stages, dt: part, total: dt, limits })
     }
 
     /// The largest stable sub-step with the fewest stages the method takes: the length of its real stability interval
@@ -177,6 +242,7 @@ impl Method {
         let fewest = match self.family {
             Family::Explicit(tableau) => tableau.stages(),
             Family::Stabilised(_) => stabilised::LEAST_STAGES,
+            Family::Implicit(tableau) => tableau.solves(),
         };
         self.interval(fewest) / bounds.spectral
     }
@@ -186,11 +252,17 @@ impl Method {
         matches!(self.family, Family::Stabilised(_))
     }
 
+    /// Whether stages are solved for: any step is stable, and bounds on the operator are not needed.
+    pub fn is_implicit(&self) -> bool {
+        matches!(self.family, Family::Implicit(_))
+    }
+
     /// z such that the method is stable for real eigenvalues in [-z / dt, 0].
     pub fn interval(&self, stages: u32) -> f64 {
         match self.family {
             Family::Explicit(tableau) => tableau.interval,
             Family::Stabilised(recursion) => (recursion.interval)(f64::from(stages)),
+            Family::Implicit(_) => f64::INFINITY,
         }
     }
 
@@ -204,15 +276,18 @@ impl Method {
         y: &mut [f64],
         work: &mut Work,
     ) -> Result<()> {
+        work.slack = 0.0;
         match self.family {
             Family::Explicit(tableau) => tableau.advance(schedule.dt, system, pool, t, y, work),
             Family::Stabilised(recursion) => recursion.advance(schedule, system, pool, t, y, work),
+            Family::Implicit(tableau) => tableau.advance(schedule, system, pool, t, y, work),
         }
     }
 
     fn most_stages(&self, options: &Options) -> Result<u32> {
         let recursion = match self.family {
             Family::Explicit(tableau) => return Ok(tableau.stages()),
+            Family::Implicit(tableau) => return Ok(tableau.solves()),
             Family::Stabilised(recursion) => recursion,
         };
         match options.stages {
@@ -248,7 +323,9 @@ impl Method {
 /// The arrays a sub-step works on: reserved by the first sub-step, reused by all others of the same length.
 #[derive(Debug, Default)]
 pub struct Work {
-    arrays: [Vec<f64>; 5],
+    arrays: [Vec<f64>; 10],
+    /// How far the last sub-step may be from the solution of its equations: 0 for explicit methods.
+    pub slack: f64,
 }
 
 impl Work {
@@ -267,5 +344,7 @@ impl Work {
     }
 }
 
+#[cfg(test)]
+mod implicit_tests;
 #[cfg(test)]
 mod tests;

@@ -5,8 +5,10 @@
 use super::conductivity::Law;
 use super::surface::Surface;
 use crate::error::{Error, Result};
+use crate::memory;
 use crate::operator::{Mean, Pairs};
 use crate::pool::{BLOCK, Pool};
+use crate::sum;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A host's function: fills the last slice for time t and temperatures T; the `u32`s are the host's particle numbers.
@@ -53,7 +55,9 @@ pub struct Heat<'a> {
     pub quiet: bool,
     /// Set by the host from any thread to stop the step.
     pub cancel: &'a AtomicBool,
-    /// How often [`Heat::rate`] was called.
+    /// What exchange with the outside takes from dT/dt per kelvin, 1/s, as last linearised; empty where there is none.
+    pub slopes: Vec<f64>,
+    /// Applications of the operator so far.
     pub applications: u64,
 }
 
@@ -73,6 +77,61 @@ impl Heat<'_> {
             surface.add(t, self.inverse_capacity, rate);
         }
         self.release(time, t, rate)
+    }
+
+    /// Linearises the exchange with the outside about these temperatures, for [`Heat::linear`].
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn linearise_surface(&mut self, t: &[f64]) -> Result<()> {
+        let Some(surface) = self.surface else { return Ok(()) };
+        self.slopes = memory::filled("slopes", t.len(), 0.0)?;
+        surface.slopes(t, |i, slope| self.slopes[i] = slope * self.inverse_capacity[i]);
+        Ok(())
+    }
+
+    /// The linear operator on x: the conductivity as evaluated last, the surface as linearised last.
+    ///
+    /// # Errors
+    /// `Cancelled`; `NoMemory`.
+    pub fn linear(&mut self, x: &[f64], out: &mut [f64]) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled);
+        }
+        self.applications += 1;
+        self.diffuse(x, out)?;
+        let slopes = &self.slopes;
+        self.pool.chunks(&mut out[..slopes.len()], BLOCK, |start, part| {
+            part.iter_mut().enumerate().for_each(|(k, y)| *y -= slopes[start + k] * x[start + k]);
+        });
+        Ok(())
+    }
+
+    /// Whether the rate is a linear function of T.
+    pub fn is_linear(&self) -> bool {
+        let source = !matches!(self.release, Release::Host(..));
+        source && self.kappa_is_constant() && self.surface.is_none_or(Surface::is_linear)
+    }
+
+    /// The power that sources and the outside bring in, W: what is left of Σ m c_v dT/dt where exchanges between
+    /// particles cancel. `None` where some T is fixed, for there heat comes and goes unseen.
+    ///
+    /// # Errors
+    /// As [`Heat::rate`].
+    pub fn supply(&mut self, time: f64, t: &[f64]) -> Result<Option<f64>> {
+        if sum::first(self.pool, t.len(), |i| self.inverse_capacity[i] == 0.0).is_some() {
+            return Ok(None);
+        }
+        if self.surface.is_none() && matches!(self.release, Release::None) {
+            return Ok(Some(0.0));
+        }
+        let mut rate = memory::filled("supply", t.len(), 0.0)?;
+        if let Some(surface) = self.surface {
+            surface.add(t, self.inverse_capacity, &mut rate);
+        }
+        self.release(time, t, &mut rate)?;
+        let inverse = self.inverse_capacity;
+        Ok(Some(sum::sum(self.pool, t.len(), |i| capacity(inverse[i]) * rate[i])))
     }
 
     /// The diffusive part of dT/dt alone, with the conductivity evaluated last.
@@ -138,7 +197,7 @@ impl Heat<'_> {
             }
             _ => return Ok(&[]),
         };
-        let bad = crate::sum::first(self.pool, kappa.len(), |i| !(kappa[i] >= 0.0 && kappa[i].is_finite()));
+        let bad = sum::first(self.pool, kappa.len(), |i| !(kappa[i] >= 0.0 && kappa[i].is_finite()));
         if let Some(i) = bad {
             let value = format!("{} (at T = {})", kappa[i], t[i]);
             return Err(Error::bad_at("kappa", self.host[i] as usize, value, "it must be finite and not negative"));
@@ -164,6 +223,11 @@ impl Heat<'_> {
         });
         Ok(())
     }
+}
+
+/// m c_v from its inverse; 0 where T is fixed.
+pub fn capacity(inverse: f64) -> f64 {
+    if inverse > 0.0 { 1.0 / inverse } else { 0.0 }
 }
 
 fn called(which: &str, code: i32) -> Result<()> {

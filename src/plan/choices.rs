@@ -16,7 +16,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ("operator", "brookshaw, kernel or direct (default brookshaw)"),
     ("normalise", "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own)"),
     ("mean", "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic)"),
-    ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1 or rkl2 (default rkl2)"),
+    ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2 (default rkl2)"),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     (
         "change",
@@ -28,6 +28,11 @@ pub static WORDS: &[(&str, &str)] = &[
         "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)",
     ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
+    (
+        "solver_tolerance",
+        "residual of implicit integrators' equations, relative to the change that a stage makes (default 1e-10)",
+    ),
+    ("max_iterations", "most iterations of conjugate gradients in a stage of an implicit integrator (default 2000)"),
     ("threads", "worker threads; 0: as many as the process may use (default 0)"),
     ("memory", "most bytes for weights, like 2e9 (default: what the machine has available)"),
     ("without", "rules of the plan to switch off, separated by commas"),
@@ -74,6 +79,11 @@ impl Choices {
         };
         let mean = Mean::find(words.take("mean").unwrap_or("harmonic"))?;
         let method = integrator::find(words.take("integrator").unwrap_or("rkl2"))?;
+        if method.is_implicit() && !operator.positive {
+            let rule = format!("integrator={} needs operator=brookshaw or operator=kernel", method.name);
+            let reason = "whose weights are all positive, for its equations to have a solution";
+            return Err(Error::bad("operator", operator.name, &format!("{rule}, {reason}")));
+        }
         let options = options(&mut words)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
         let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
@@ -115,6 +125,9 @@ fn options(words: &mut Words) -> Result<Options> {
     if let Some(most) = words.count("max_applications", 1..=u64::MAX)? {
         options.max_applications = most;
     }
+    let tolerance = words.number("solver_tolerance", "it must be between 0 and 1", |v| v > 0.0 && v < 1.0)?;
+    options.limits.tolerance = tolerance.unwrap_or(options.limits.tolerance);
+    options.limits.iterations = words.count("max_iterations", 1..=1_000_000)?.unwrap_or(options.limits.iterations);
     Ok(options)
 }
 
@@ -150,6 +163,8 @@ mod tests {
             ("heat without=same", "same_h"),
             ("heat h_fac=-1", "h_fac must be positive"),
             ("heat dim=2 wall", "'wall'"),
+            ("heat operator=direct integrator=sdirk2", "needs operator=brookshaw or operator=kernel"),
+            ("heat solver_tolerance=0", "between 0 and 1"),
         ] {
             let text = Choices::parse(line).err().map(|e| e.to_string()).unwrap_or_default();
             assert!(text.contains(expected), "{line}: {text}");
@@ -171,6 +186,8 @@ mod tests {
             "max_stages=9",
             "bounds=free",
             "max_applications=7",
+            "solver_tolerance=1e-6",
+            "max_iterations=500",
             "threads=1",
             "memory=1e9",
             "without=same_h",

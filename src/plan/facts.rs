@@ -31,6 +31,8 @@ pub struct Facts {
     pub keeps_bounds: bool,
     pub operator: &'static str,
     pub integrator: &'static str,
+    /// The integrator solves for its stages.
+    pub implicit: bool,
     /// Arrays of n that the integrator holds.
     pub buffers: f64,
 }

@@ -105,17 +105,19 @@ impl Plan {
     fn list_motion(&self, facts: &Facts, setup: When, add: &mut impl FnMut(&'static str, When, f64, f64, String)) {
         let (n, pairs) = (facts.n as f64, facts.n as f64 * facts.neighbours);
         let bound_when = if facts.kappa_of_t { When::EachStep } else { setup };
-        add("bound", bound_when, 0.0, pairs, "Gershgorin's circles; power iteration where it saves stages".into());
+        if !facts.implicit {
+            let about = "Gershgorin's circles; power iteration where it saves stages";
+            add("bound", bound_when, 0.0, pairs, about.into());
+        }
         if facts.kappa_of_t {
             add("kappa", When::EachStage, 8.0 * n, 0.0, "kappa(T)".into());
         }
-        add(
-            "stages",
-            When::EachStage,
-            facts.buffers * 8.0 * n,
-            pairs,
-            format!("{}: rows of weights", facts.integrator),
-        );
+        let (name, how) = match facts.implicit {
+            true => ("solve", "conjugate gradients on rows of weights"),
+            false => ("stages", "rows of weights"),
+        };
+        let about = format!("{}: {how}", facts.integrator);
+        add(name, When::EachStage, facts.buffers * 8.0 * n, pairs, about);
         let mut promises = vec!["finite"];
         if facts.keeps_bounds {
             promises.push("within the bounds of before");

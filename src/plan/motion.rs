@@ -4,11 +4,11 @@ use super::report::{Report, Timers};
 use super::state::Progress;
 use super::{Choices, Plan};
 use crate::error::{Error, Result};
-use crate::integrator::{self, Bounds, Method, Schedule, System, Work};
+use crate::integrator::{self, Bounds, Linear, Method, Schedule, System, Work};
 use crate::memory;
-use crate::model::heat::Heat;
+use crate::model::heat::{self, Heat};
 use crate::operator::spectrum;
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 use crate::sum;
 use std::time::Instant;
 
@@ -29,6 +29,26 @@ impl System for Heat<'_> {
     fn rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<()> {
         Heat::rate(self, t, y, dy)
     }
+
+    fn linearise(&mut self, t: f64, y: &[f64], diagonal: &mut [f64], weight: &mut [f64]) -> Result<Linear> {
+        let circles = self.circles(t, y)?;
+        if let Some(i) = sum::first(self.pool, circles.len(), |i| !circles[i].1.is_finite()) {
+            let rule = "too large: its product with the pair weights exceeds all numbers";
+            return Err(Error::bad_at("kappa", self.host[i] as usize, "given", rule));
+        }
+        diagonal.iter_mut().zip(&circles).for_each(|(d, circle)| *d = circle.1);
+        weight.iter_mut().zip(self.inverse_capacity).for_each(|(w, &i)| *w = heat::capacity(i));
+        self.linearise_surface(y)?;
+        Ok(if self.is_linear() { Linear::Exact } else { Linear::Frozen })
+    }
+
+    fn apply(&mut self, x: &[f64], ax: &mut [f64]) -> Result<()> {
+        self.linear(x, ax)
+    }
+
+    fn supply(&mut self, t: f64, y: &[f64]) -> Result<Option<f64>> {
+        Heat::supply(self, t, y)
+    }
 }
 
 /// The largest explicit Euler step that is stable under these bounds; infinite where nothing diffuses.
@@ -40,6 +60,9 @@ impl Motion<'_> {
     /// Advances `t` by exactly `dt` from `time`. Where the operator changes with T, bounds and schedule are made anew
     /// for each sub-step.
     pub fn advance(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        if self.choices.method.is_implicit() {
+            return self.solve(time, dt, t, report);
+        }
         let reference = self.norm(|i| t[i]);
         let mut done = 0.0;
         while done < dt && !t.is_empty() {
@@ -63,6 +86,24 @@ impl Motion<'_> {
             done = if to_the_end { dt } else { done + schedule.start(steps) };
         }
         Ok(())
+    }
+
+    /// One sub-step of an implicit method: stable whatever dt is.
+    fn solve(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        let calm = Bounds { spectral: 0.0, diagonal: 0.0 };
+        let (method, options) = (self.choices.method, &self.choices.options);
+        let schedule = method.schedule(dt, calm, options)?;
+        if schedule.substeps == 0 || t.is_empty() {
+            return Ok(());
+        }
+        let start = Instant::now();
+        // For the report alone, so Gershgorin's bound will do.
+        let known = self.known.filter(|_| self.is_linear());
+        report.limit = explicit_limit(known.map_or_else(|| self.proven_bounds(time, t), Ok)?);
+        method.advance(&schedule, &mut self.heat, self.pool, time, t, self.work)?;
+        self.timers.add("solve", start.elapsed());
+        (report.substeps, report.stages) = (1, schedule.stages.into());
+        self.tell(time, dt, dt)
     }
 
     /// The longest sub-step of a stabilised method in which T changes, at the present rate, by no more than `change`
@@ -141,22 +182,9 @@ impl Motion<'_> {
             return Ok(proven);
         }
         let (heat, pool) = (&mut self.heat, self.pool);
-        let capacity = |&inverse: &f64| if inverse > 0.0 { 1.0 / inverse } else { 0.0 };
-        let weight = memory::collected("capacities", heat.inverse_capacity.iter().map(capacity))?;
-        let mut slopes = memory::filled("slopes", if heat.surface.is_some() { t.len() } else { 0 }, 0.0)?;
-        if let Some(surface) = heat.surface {
-            surface.slopes(t, |i, slope| slopes[i] = slope * heat.inverse_capacity[i]);
-        }
-        let mut applications = 0;
-        let spectral = spectrum::largest(pool, &weight, proven.spectral, |x, y| {
-            applications += 1;
-            heat.diffuse(x, y)?;
-            pool.chunks(&mut y[..slopes.len()], BLOCK, |start, part| {
-                part.iter_mut().enumerate().for_each(|(k, y)| *y -= slopes[start + k] * x[start + k]);
-            });
-            Ok(())
-        })?;
-        self.heat.applications += applications;
+        let weight = memory::collected("capacities", heat.inverse_capacity.iter().map(|&i| heat::capacity(i)))?;
+        heat.linearise_surface(t)?;
+        let spectral = spectrum::largest(pool, &weight, proven.spectral, |x, y| heat.linear(x, y))?;
         Ok(Bounds { spectral, ..proven })
     }
 

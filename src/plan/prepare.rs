@@ -298,6 +298,7 @@ impl State {
             host: &cloud.host,
             quiet: plan.leaves_out("quiet_rows"),
             cancel: &self.cancel,
+            slopes: Vec::new(),
             applications: 0,
         };
         let mut motion = Motion {

@@ -10,9 +10,9 @@ pub struct Report {
     pub substeps: u64,
     /// Stages of the last sub-step.
     pub stages: u64,
-    /// Applications of the operator, those of the power iteration included.
+    /// Applications of the operator, those of the power iteration and of solvers included.
     pub applications: u64,
-    /// Largest stable explicit step, s.
+    /// Largest stable explicit step, s; after an implicit step what Gershgorin's circles prove, which is less.
     pub limit: f64,
     pub t_min: f64,
     pub t_max: f64,

@@ -79,7 +79,7 @@ pub static RULES: &[Rule] = &[
         name: "proven_bound",
         reason: "where Gershgorin's bound asks for no more stages than any bound would, no power iteration",
         same: Same::Bits,
-        holds: |_| true,
+        holds: |f| !f.implicit,
     },
     Rule {
         name: "rate_only",

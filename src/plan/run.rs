@@ -139,7 +139,7 @@ impl State {
 
     fn check(&self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
         self.refuse_what_is_not_finite("T", t)?;
-        let slack = ROUNDING * before.high.abs().max(before.low.abs());
+        let slack = ROUNDING * before.high.abs().max(before.low.abs()) + self.work.slack;
         if self.may_grow(plan) {
             let after = self.spread(t);
             if after > before.spread * (1.0 + 1e-9) + slack {

@@ -349,6 +349,7 @@ impl State {
             keeps_bounds: choices.operator.positive && strong_stability && !heated && exchanging == 0,
             operator: choices.operator.name,
             integrator: choices.method.name,
+            implicit: choices.method.is_implicit(),
             buffers: self.work.bytes() as f64 / 8.0 / self.len().max(1) as f64,
         }
     }

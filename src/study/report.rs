@@ -126,7 +126,7 @@ pub struct Seconds {
 impl Seconds {
     /// Nanoseconds in the passes that apply the operator, over applications and `items`.
     pub fn per_application(&self, work: &Work, items: f64) -> Option<f64> {
-        let applies = |name: &str| name == "stages" || name == "bound";
+        let applies = |name: &str| ["stages", "bound", "solve"].contains(&name);
         let seconds: f64 = self.passes.iter().filter(|(name, _)| applies(name)).map(|(_, s)| s).sum();
         let applied = work.applications as f64 * items;
         (applied > 0.0).then(|| 1e9 * seconds / applied)
