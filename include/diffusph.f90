@@ -54,7 +54,7 @@ module diffusph
         integer(c_int64_t) :: substeps = 0
         integer(c_int64_t) :: stages = 0    ! of the last sub-step
         integer(c_int64_t) :: applications = 0
-        real(c_double) :: limit = 0         ! largest stable explicit step, s
+        real(c_double) :: limit = 0         ! a stable explicit step, s; diffusph_limit finds the largest
         real(c_double) :: T_min = 0
         real(c_double) :: T_max = 0
         real(c_double) :: energy_before = 0 ! sum of m c_v T, J

@@ -242,7 +242,7 @@ typedef struct diffusph_report {
    */
   int64_t applications;
   /**
-   * Largest stable explicit step, s; infinite where nothing diffuses.
+   * A stable explicit step, s, as far as it was known without more work: diffusph_limit finds the largest.
    */
   double limit;
   /**

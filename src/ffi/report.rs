@@ -21,7 +21,7 @@ pub struct Report {
     pub stages: i64,
     /// Applications of the operator.
     pub applications: i64,
-    /// Largest stable explicit step, s; infinite where nothing diffuses.
+    /// A stable explicit step, s, as far as it was known without more work: diffusph_limit finds the largest.
     pub limit: f64,
     /// Smallest temperature, K.
     pub T_min: f64,

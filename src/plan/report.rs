@@ -12,7 +12,7 @@ pub struct Report {
     pub stages: u64,
     /// Applications of the operator, those of the power iteration and of solvers included.
     pub applications: u64,
-    /// Largest stable explicit step, s; after an implicit step what Gershgorin's circles prove, which is less.
+    /// A stable explicit step, s, from the bounds that the step needed; `limit` finds the largest. after an implicit step what Gershgorin's circles prove, which is less.
     pub limit: f64,
     pub t_min: f64,
     pub t_max: f64,
