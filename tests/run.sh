@@ -4,12 +4,11 @@
 set -eu
 cd "$(dirname "$0")/.."
 
-# Registries have bad minutes: tries again, a minute apart.
+# Registries have bad minutes: tries again, a minute apart, for so many seconds from the start.
+deadline=$(($(date +%s) + ${PATIENCE:-180}))
 patiently() {
-    tries=0
     until "$@"; do
-        tries=$((tries + 1))
-        [ "$tries" -lt 15 ] || return 1
+        [ "$(date +%s)" -lt "$deadline" ] || return 1
         echo "failed, trying again in a minute: $*" >&2
         sleep 60
     done
