@@ -109,8 +109,13 @@ impl Heat<'_> {
 
     /// Whether the rate is a linear function of T.
     pub fn is_linear(&self) -> bool {
-        let source = !matches!(self.release, Release::Host(..));
-        source && self.kappa_is_constant() && self.surface.is_none_or(Surface::is_linear)
+        !matches!(self.release, Release::Host(..)) && self.operator_is_fixed()
+    }
+
+    /// Whether the operator stays the same while T changes.
+    pub fn operator_is_fixed(&self) -> bool {
+        let kappa_of_t = matches!(self.conductivity, Conductivity::Law(..) | Conductivity::Host(..));
+        !kappa_of_t && self.surface.is_none_or(Surface::is_linear)
     }
 
     /// The power that sources and the outside bring in, W: what is left of Σ m c_v dT/dt where exchanges between
@@ -165,10 +170,6 @@ impl Heat<'_> {
     /// What all pair sums are multiplied by.
     fn factor(&self) -> f64 {
         if let Conductivity::Number(kappa) = self.conductivity { kappa } else { 1.0 }
-    }
-
-    pub fn kappa_is_constant(&self) -> bool {
-        !matches!(self.conductivity, Conductivity::Law(..) | Conductivity::Host(..))
     }
 
     fn pair_kappa(&self) -> Option<(Mean, &[f64])> {

@@ -74,7 +74,7 @@ impl Motion<'_> {
             }
             report.stages = schedule.stages.into();
             let start = Instant::now();
-            let steps = if self.is_linear() { schedule.substeps } else { 1 };
+            let steps = if self.heat.operator_is_fixed() { schedule.substeps } else { 1 };
             for k in 0..steps {
                 let now = time + done + schedule.start(k);
                 method.advance(&schedule, &mut self.heat, self.pool, now, t, self.work)?;
@@ -98,7 +98,7 @@ impl Motion<'_> {
         }
         let start = Instant::now();
         // For the report alone, so Gershgorin's bound will do.
-        let known = self.known.filter(|_| self.is_linear());
+        let known = self.known.filter(|_| self.heat.operator_is_fixed());
         report.limit = explicit_limit(known.map_or_else(|| self.proven_bounds(time, t), Ok)?);
         method.advance(&schedule, &mut self.heat, self.pool, time, t, self.work)?;
         self.timers.add("solve", start.elapsed());
@@ -127,11 +127,6 @@ impl Motion<'_> {
         sum::spread(self.pool, volume.len(), |i| volume[i], value)
     }
 
-    /// Whether the operator stays the same while T changes.
-    fn is_linear(&self) -> bool {
-        self.heat.kappa_is_constant() && self.heat.surface.is_none_or(|s| s.is_linear())
-    }
-
     fn schedule(&self, dt: f64, bounds: Bounds) -> Result<(&'static Method, Schedule)> {
         let (method, options) = (self.choices.method, &self.choices.options);
         if self.plan.leaves_out("one_stage") && options.stages.is_none() && dt <= explicit_limit(bounds) {
@@ -143,14 +138,14 @@ impl Motion<'_> {
 
     /// Bounds that are good enough for a step of `dt`.
     pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
-        if let Some(bounds) = self.known.filter(|_| self.is_linear()) {
+        if let Some(bounds) = self.known.filter(|_| self.heat.operator_is_fixed()) {
             return Ok(bounds);
         }
         let start = Instant::now();
         let mut bounds = self.proven_bounds(time, t)?;
         if !(self.plan.leaves_out("proven_bound") && self.is_least_work(dt, bounds)) {
             bounds = self.refine(bounds, t)?;
-            *self.known = Some(bounds).filter(|_| self.is_linear());
+            *self.known = Some(bounds).filter(|_| self.heat.operator_is_fixed());
         }
         self.timers.add("bound", start.elapsed());
         Ok(bounds)
