@@ -72,7 +72,7 @@ pub unsafe extern "C" fn diffusph_set_particles(
 }
 
 /// A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. "x" moves
-/// the particles; "b" sets b_x, b_y, … at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
+/// the particles; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
 /// xy; xx, yy, zz, xy, yz, xz).
 ///
 /// \param name   which
