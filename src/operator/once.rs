@@ -8,7 +8,7 @@ use super::matrix::{Block, Matrix, Seen, row_sum};
 use super::table::Tensor;
 use super::tensor::{self, Sym};
 use super::twice::Twice;
-use super::{Mean, Operator, moments, stencils};
+use super::{Mean, Operator, consistent, moments, stencils};
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::memory;
@@ -25,6 +25,8 @@ pub struct Assembly<'a> {
     pub volume: &'a [f64],
     /// One kernel evaluation per pair: every h is the same.
     pub same_h: bool,
+    /// Of polynomials that consistent weights are exact for: 2, 4 or 6.
+    pub order: u32,
     /// How each particle conducts by direction, trace nu; none where all are isotropic.
     pub shape: Option<&'a [Sym]>,
 }
@@ -52,6 +54,10 @@ impl Assembly<'_> {
         (self.operator.weight)(self.kernel, q, w, spare);
         let scale = own.powi(power);
         w.iter_mut().for_each(|w| *w *= scale);
+        if matches!(self.operator.tensor, Tensor::Consistent) {
+            consistent::fit(self, row, w);
+            return Ok(w);
+        }
         if !self.same_h {
             let inverse = |j: &u32| 1.0 / h[*j as usize];
             q.iter_mut().zip(row.r).zip(row.j).for_each(|((q, r), j)| *q = r * inverse(j));

@@ -26,6 +26,8 @@ pub enum Tensor {
     Scalar,
     /// The weight of a pair is multiplied by a function of r̂·S r̂ and nu, which is 1 for S = I.
     Angular(fn(along: f64, nu: f64) -> f64),
+    /// It does not: weights are fitted, particle by particle, to be exact for polynomials.
+    Consistent,
     /// Positive weights fitted to S particle by particle.
     Stencils,
     /// Gradient, flux, divergence: two sweeps over the pairs. The weights of pairs serve its stabiliser. `limited`: no
@@ -87,6 +89,16 @@ pub static OPERATORS: &[Operator] = &[
         },
     },
     Operator {
+        name: "consistent",
+        about: "weights that are exact for polynomials up to order=2, 4 or 6 on any particles, by local least squares; not \
+                symmetric, so conservative only as far as T is resolved; not positive",
+        positive: false,
+        dissipative: false,
+        normalise: false,
+        tensor: Tensor::Consistent,
+        weight: |kernel, q, w, _| kernel.w(q, w),
+    },
+    Operator {
         name: "espanol-revenga",
         about: "tensor kappa: w = -((nu + 2) r.kappa.r - tr kappa) F/r (Espanol & Revenga 2003); symmetric, conservative, \
                 positive only while kappa_par <= 3 kappa_perp",
@@ -137,6 +149,13 @@ pub static OPERATORS: &[Operator] = &[
         weight: brookshaw,
     },
 ];
+
+impl Operator {
+    /// Whether it takes a conductivity that is not the same in all directions.
+    pub fn takes_tensors(&self) -> bool {
+        !matches!(self.tensor, Tensor::Scalar | Tensor::Consistent)
+    }
+}
 
 /// The operator of this name, whatever its case.
 pub fn find(name: &str) -> Result<&'static Operator> {

@@ -5,7 +5,8 @@ use crate::error::{Error, Result};
 use crate::integrator::{self, Method, Options};
 use crate::kernel::Kernel;
 use crate::model::MODELS;
-use crate::operator::{Mean, Operator, table};
+use crate::operator::table::{self, Tensor};
+use crate::operator::{Mean, Operator};
 use crate::words::{Words, choice};
 
 /// Every word with its meaning and default, as `list words` prints it.
@@ -15,8 +16,9 @@ pub static WORDS: &[(&str, &str)] = &[
     ("h_fac", "smoothing length over particle spacing (default: the kernel's own)"),
     (
         "operator",
-        "brookshaw, kernel or direct; espanol-revenga, espanol-revenga-kernel, two-first, limited or monotone, which take a tensor kappa too (default brookshaw)",
+        "brookshaw, kernel, direct or consistent; espanol-revenga, espanol-revenga-kernel, two-first, limited or monotone, which take a tensor kappa too (default brookshaw)",
     ),
+    ("order", "of consistent: exact for polynomials of degree 2, 4 or 6 (default 4)"),
     ("theta", "of two-first and limited: penalty on jumps that the gradients do not explain, 0 for none (default 1)"),
     (
         "gradient",
@@ -24,7 +26,10 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     ("allow", "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow"),
     ("normalise", "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own)"),
-    ("mean", "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic)"),
+    (
+        "mean",
+        "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic; consistent: arithmetic)",
+    ),
     ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2 (default rkl2)"),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     (
@@ -52,8 +57,9 @@ pub static WORDS: &[(&str, &str)] = &[
 /// a hot disc 0.3, 2e-3 and 5e-4, for 1.2 to 2 times the applications and still a fifth of ssprk3's.
 const CHANGE: f64 = 0.05;
 
-/// Default of `theta`. On 2-D glass and 20 % jitter, kappa_perp = 0 at 0 and 30 degrees, error of a decaying mode on jitter
-/// and leakage across b: 1.2 and 2e-5 at 0, 0.24 and 4e-5 at 0.1, 0.15 and 9e-5 at 0.3, 0.09 and 3e-4 at 1.
+/// Default of `theta`. 20 % jitter, kappa_perp = 0, M4, M6 and C4 alike to a tenth, three seeds, b at 0 and 30 degrees: error of
+/// a decaying mode on 32² particles 1.2 at 0, 0.28 at 0.1, 0.17 at 0.3, 0.10 at 1, 0.07 at 3, leakage across b 1e-5, 4e-5,
+/// 9e-5, 3e-4, 7e-4; on 16³ error 0.72, 0.45, 0.35, 0.24, 0.18, leakage 4e-5, 3e-4, 9e-4, 3e-3, 9e-3.
 const THETA: f64 = 1.0;
 
 pub struct Choices {
@@ -62,6 +68,8 @@ pub struct Choices {
     pub h_fac: f64,
     pub operator: &'static Operator,
     pub normalise: bool,
+    /// Of consistent weights.
+    pub order: u32,
     pub theta: f64,
     /// Gradients exact for linear fields, rather than those of the paper.
     pub corrected: bool,
@@ -95,7 +103,13 @@ impl Choices {
             None => operator.normalise,
             Some(word) => choice("normalise", word, &[("pair", true), ("none", false)])?,
         };
-        let mean = Mean::find(words.take("mean").unwrap_or("harmonic"))?;
+        let consistent = matches!(operator.tensor, Tensor::Consistent);
+        // Σ w (k_a + k_b)/2 (T_b − T_a) = ½ (∇²(k T) + k ∇²T − T ∇²k) = ∇·(k ∇T): only this mean keeps the order.
+        let mean = Mean::find(words.take("mean").unwrap_or(if consistent { "arithmetic" } else { "harmonic" }))?;
+        let order = match words.take("order") {
+            None => 4,
+            Some(word) => choice("order", word, &[("2", 2), ("4", 4), ("6", 6)])?,
+        };
         let method = integrator::find(words.take("integrator").unwrap_or("rkl2"))?;
         if method.is_implicit() && !operator.dissipative {
             let able = table::OPERATORS.iter().filter(|o| o.dissipative).map(|o| o.name).collect::<Vec<_>>().join(", ");
@@ -124,6 +138,7 @@ impl Choices {
             h_fac,
             operator,
             normalise,
+            order,
             theta: theta.unwrap_or(THETA),
             corrected,
             allow_unstable,
@@ -209,6 +224,7 @@ mod tests {
             "kernel=M4",
             "h_fac=1.2",
             "operator=kernel",
+            "order=6",
             "theta=0.5",
             "gradient=plain",
             "allow=unstable",

@@ -81,8 +81,8 @@ impl State {
         let Some(tensor) = Tensor::read(n, dim, set, at, |i| self.host(i))? else { return Ok(()) };
         let isotropic = tensor.is_isotropic(dim);
         match choices.operator.tensor {
-            Form::Scalar if !isotropic => {
-                let able = OPERATORS.iter().filter(|o| !matches!(o.tensor, Form::Scalar)).map(|o| o.name);
+            _ if !isotropic && !choices.operator.takes_tensors() => {
+                let able = OPERATORS.iter().filter(|o| o.takes_tensors()).map(|o| o.name);
                 let rule = format!("it takes no tensor kappa; use {}", able.collect::<Vec<_>>().join(", "));
                 return Err(Error::bad("operator", choices.operator.name, &rule));
             }
@@ -196,10 +196,10 @@ impl State {
     /// Calls `work` with the assembly of the operator. Needs the geometry.
     pub fn with_assembly<T>(&self, same_h: bool, work: impl FnOnce(&Assembly) -> Result<T>) -> Result<T> {
         let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
-        let (operator, kernel) = (self.choices.operator, &self.choices.kernel);
+        let (operator, kernel, order) = (self.choices.operator, &self.choices.kernel, self.choices.order);
         let units = self.unit_shape()?;
         let shape = self.shape(&units);
-        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h, shape }))
+        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h, order, shape }))
     }
 
     /// Shapes of isotropic particles, where `without=isotropic` asks for them; else empty.
@@ -387,9 +387,10 @@ impl State {
                 rows = Rows::new(cloud, &g.h, self.choices.kernel.radius(), &self.pool)?;
                 let (operator, kernel, same_h) =
                     (self.choices.operator, &self.choices.kernel, plan.leaves_out("same_h"));
+                let order = self.choices.order;
                 let own = self.directions.as_ref().map_or(&[][..], |d| &d.shape);
                 let shape = [own, &units].into_iter().find(|s| !s.is_empty());
-                assembly = Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h, shape };
+                assembly = Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h, order, shape };
                 Pairs::Fresh(&assembly)
             }
         };
