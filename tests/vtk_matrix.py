@@ -116,7 +116,7 @@ def write_xml(folder):
             arrays = fields
             if mode == "ascii":
                 # In digits all NaNs are one; VTK 9.1 writes -0 without its sign, which adding 0 takes away.
-                arrays = fields | {"T": np.where(np.isnan(fields["T"]), np.nan, fields["T"] + LOST_SIGN)}
+                arrays = fields | {"T": np.where(np.isnan(fields["T"]), np.nan, fields["T"]) + LOST_SIGN}
                 data.GetPointData().AddArray(vtk_array("T", arrays["T"]))
             else:
                 data.GetPointData().AddArray(vtk_array("T", fields["T"]))
@@ -134,6 +134,15 @@ def write_xml(folder):
             expect(path, points, arrays)
 
 
+def point_cloud(points, fields, data):
+    """pyvista's own way to make one: its cells have other types than those of VTK's arrays."""
+    out = pyvista.PolyData(points)
+    for name, array in fields.items():
+        out.point_data[name] = array
+    out.GetFieldData().ShallowCopy(data.GetFieldData())
+    return out if data.IsA("vtkPolyData") else out.cast_to_unstructured_grid()
+
+
 def write_defaults(folder):
     for n in SIZES:
         points, fields = cloud(n)
@@ -148,6 +157,9 @@ def write_defaults(folder):
             if n and pyvista:
                 path = f"{folder}/pyvista_{n}.{ending}"
                 pyvista.wrap(data).save(path)
+                expect(path, points, fields)
+                path = f"{folder}/pyvista_{n}_{ending}.vtk"
+                point_cloud(points, fields, data).save(path)
                 expect(path, points, fields)
         # meshio cannot compress an empty array.
         for name, options in [("ascii", dict(binary=False)), ("plain", dict(compression=None)), ("zlib", {})]:
@@ -183,6 +195,14 @@ def write_pieces(folder):
     expect(f"{folder}/pieces.pvtu", points, fields)
 
 
+def bits(n):
+    out = vtk.vtkBitArray()
+    out.SetName("bits")
+    for i in range(n):
+        out.InsertNextValue(i % 3 == 0)
+    return out
+
+
 def write_legacy(folder):
     for n, binary, version in itertools.product([1, 1000], [False, True], [42, 51]):
         points, fields = cloud(n) if binary else tame(n)
@@ -190,15 +210,20 @@ def write_legacy(folder):
         for kind, writer_of in [(vtk.vtkUnstructuredGrid, vtk.vtkUnstructuredGridWriter),
                                 (vtk.vtkPolyData, vtk.vtkPolyDataWriter)]:
             data = data_set(kind, points, fields)
-            data.GetFieldData().RemoveArray("note")  # vtkio has no strings
-            writer = writer_of()
-            path = f"{folder}/legacy_{n}_{'binary' if binary else 'ascii'}_{version}_{kind.__name__}.vtk"
-            writer.SetFileName(path)
-            writer.SetInputData(data)
-            writer.SetFileVersion(version)
-            writer.SetFileTypeToBinary() if binary else writer.SetFileTypeToASCII()
-            assert writer.Write() == 1
-            expect(path, points, fields)
+            data.GetPointData().AddArray(bits(n))  # to be left aside
+            bare = kind()
+            bare.SetPoints(data.GetPoints())
+            bare.GetPointData().ShallowCopy(data.GetPointData())
+            bare.GetFieldData().ShallowCopy(data.GetFieldData())
+            for cells, grid in [("vertices", data), ("bare", bare)]:
+                writer = writer_of()
+                path = f"{folder}/legacy_{n}_{'binary' if binary else 'ascii'}_{version}_{kind.__name__}_{cells}.vtk"
+                writer.SetFileName(path)
+                writer.SetInputData(grid)
+                writer.SetFileVersion(version)
+                writer.SetFileTypeToBinary() if binary else writer.SetFileTypeToASCII()
+                assert writer.Write() == 1
+                expect(path, points, fields)
     for n, binary, kind in itertools.product([1, 1000], [False, True], ["vtk", "vtk42"]):
         points, fields = cloud(n) if binary else tame(n)
         path = f"{folder}/meshio_{n}_{'binary' if binary else 'ascii'}_{kind}.vtk"
