@@ -154,19 +154,46 @@ fn a_disk_that_fills_up_leaves_the_old_file() {
         let write = || unsafe { diffusph_write_vtk(host.s, host.path("a.vtu")) };
         let file = host.dir.path().join("a.vtu");
         let (first, old) = (write(), std::fs::read(&file).unwrap_or_default());
-        // No file of this process may grow beyond 100 bytes from here on.
-        let most = libc::rlimit { rlim_cur: 100, rlim_max: 100 };
-        // SAFETY: plain system calls.
-        unsafe {
-            libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
-            libc::setrlimit(libc::RLIMIT_FSIZE, &most);
-        }
-        let whole = std::fs::read_dir(host.dir.path()).is_ok_and(|files| files.count() == 1);
+        no_file_may_grow_beyond(100);
+        let whole = files(&host) == 1;
         let second = write();
         let same = std::fs::read(&file).is_ok_and(|now| now == old && now.len() > 100);
-        let alone = std::fs::read_dir(host.dir.path()).is_ok_and(|files| files.count() == 1);
+        let alone = files(&host) == 1;
         first == 0 && second == -7 && message(host.s).contains("a.vtu: cannot write") && whole && same && alone
     }));
+}
+
+#[test]
+fn a_disk_with_room_for_a_snapshot_but_not_for_its_list_gets_neither() {
+    assert!(in_a_child(|| {
+        let host = Host::ready("heat dim=2 threads=1");
+        let list = host.dir.path().join("run.pvd");
+        let write = || unsafe { diffusph_write_series(host.s, host.path("run.pvd")) };
+        // SAFETY: the string is ours.
+        let listed = unsafe { diffusph_write_vtk(host.s, host.path("a.vtu")) };
+        let entries: String =
+            (0..999).map(|i| format!("<DataSet timestep=\"{}\" file=\"a.vtu\"/>\n", i - 1000)).collect();
+        let text = format!("<VTKFile type=\"Collection\"><Collection>{entries}</Collection></VTKFile>");
+        std::fs::write(&list, &text).unwrap();
+        no_file_may_grow_beyond(30_000);
+        let code = write();
+        let same = std::fs::read_to_string(&list).is_ok_and(|now| now == text);
+        listed == 0 && code == -7 && message(host.s).contains("run.pvd: cannot write") && same && files(&host) == 2
+    }));
+}
+
+fn files(host: &Host) -> usize {
+    std::fs::read_dir(host.dir.path()).map_or(0, |files| files.count())
+}
+
+/// From here on, for this process.
+fn no_file_may_grow_beyond(bytes: u64) {
+    let most = libc::rlimit { rlim_cur: bytes, rlim_max: bytes };
+    // SAFETY: plain system calls.
+    unsafe {
+        libc::signal(libc::SIGXFSZ, libc::SIG_IGN);
+        libc::setrlimit(libc::RLIMIT_FSIZE, &most);
+    }
 }
 
 fn workers() -> usize {

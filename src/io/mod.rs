@@ -8,13 +8,15 @@
 //! | `split` | an XML file cut into its head and its appended section |
 //! | `payload` | the bytes of one array: base64, block headers, decompression |
 //! | `xml_write` | `.vtu`, streamed |
-//! | `legacy` | legacy `.vtk` both ways and grids of other kinds, through vtkio |
+//! | `legacy_read` | legacy `.vtk` |
+//! | `legacy` | legacy `.vtk` to write, and XML grids of other kinds, through vtkio |
 //! | `pvd` | time series of files |
 //! | `atomic` | every file appears whole or not at all |
 
 pub mod atomic;
 mod data;
 mod legacy;
+mod legacy_read;
 mod payload;
 mod pvd;
 #[cfg(test)]
@@ -64,7 +66,10 @@ fn read_any(path: &Path, whole: bool) -> Result<Snapshot> {
     let mut file = File::open(path).map_err(system)?;
     let mut start = Vec::new();
     file.by_ref().take(16).read_to_end(&mut start).map_err(system)?;
-    if start.starts_with(b"# vtk DataFile") { legacy::read(path) } else { xml_read::read(file, path, whole) }
+    if !start.starts_with(b"# vtk DataFile") {
+        return xml_read::read(file, path, whole);
+    }
+    legacy_read::read(&std::fs::read(path).map_err(system)?)
 }
 
 /// The content is wrong. The path is added where it is known: [`in_file`].

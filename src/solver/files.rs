@@ -79,8 +79,13 @@ impl Solver {
         let stem = list.file_stem().unwrap_or_default().to_string_lossy();
         let names = (earlier.len()..).map(|number| format!("{stem}_{number:04}.vtu"));
         let path = list.with_file_name(names.filter(|name| !taken(name)).take(1).collect::<String>());
+        let replaced = path.exists();
         self.write_vtk(&path)?;
-        series.append(self.state.time, &path)?;
+        series.append(self.state.time, &path).inspect_err(|_| {
+            if !replaced {
+                let _ = std::fs::remove_file(&path); // nobody will find it without the list
+            }
+        })?;
         Ok(path)
     }
 
