@@ -9,11 +9,22 @@
 //! | `setting` | particles and solvers that several cases use |
 //! | `table` | the rows as text and as JSON |
 //! | `time`, `implicit` | steps of any length; what implicit solves promise |
+//! | `material` | conductivities of every kind |
+//! | `anisotropy` | conductivities that depend on direction |
+//! | `disorder`, `extremes` | particles badly placed; sizes and units at the end of numbers |
+//! | `limits` | boundaries, steady states, callers that are wrong |
+//! | `missing` | cases of models that are not there |
 //!
 //! A case is a row of [`cases`]. What a method cannot do by its nature is a trial that is expected to fail, with the
 //! reason; that it does fail is part of the suite.
 
+mod anisotropy;
+mod disorder;
+mod extremes;
 mod implicit;
+mod limits;
+mod material;
+mod missing;
 mod seen;
 mod setting;
 mod table;
@@ -46,7 +57,17 @@ const THREADS: [usize; 2] = [1, 3];
 
 /// Every case in order of its number. Add a case to the list of its theme.
 pub fn cases() -> Vec<&'static Case> {
-    let mut all: Vec<&Case> = [time::CASES, implicit::CASES].into_iter().flatten().collect();
+    let themes = [
+        time::CASES,
+        material::CASES,
+        anisotropy::CASES,
+        disorder::CASES,
+        extremes::CASES,
+        missing::CASES,
+        implicit::CASES,
+        limits::CASES,
+    ];
+    let mut all: Vec<&Case> = themes.into_iter().flatten().collect();
     all.sort_by_key(|case| case.number);
     all
 }

@@ -137,3 +137,17 @@ fn bounds_slack(setting: &Setting, s: &mut Solver, dt: f64, spread: f64) -> Resu
     let stiffness = dt / s.limit()?;
     Ok(rounding + 2.0 * spread * (1e-10 + 4.0 * f64::EPSILON * stiffness))
 }
+
+/// Requires that a call answers with this error and that its message contains `says`.
+pub fn refused<T>(seen: &mut Seen, what: &str, answer: Result<T>, name: &str, says: &str) {
+    match answer {
+        Err(e) if e.name() == name && e.to_string().contains(says) => seen.require(&format!("{what}: {name}"), true),
+        Err(e) => seen.require(&format!("{what}: {name} ({e})"), false),
+        Ok(_) => seen.require(&format!("{what}: {name} (DONE)"), false),
+    }
+}
+/// The largest difference of a from b.
+pub fn worst(a: &[f64], b: &[f64]) -> f64 {
+    // fold(max) would pass over NaN.
+    a.iter().zip(b).map(|(a, b)| (a - b).abs()).fold(0.0, |m, d| if d > m || d.is_nan() { d } else { m })
+}
