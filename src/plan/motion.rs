@@ -109,7 +109,8 @@ impl Motion<'_> {
     /// The longest sub-step of a stabilised method in which T changes, at the present rate, by no more than `change`
     /// times its spread at the beginning. Stability allows more, but then one sub-step of second order would have to
     /// follow a decay by several factors of e, and modes that it cannot resolve would ring instead of dying (the
-    /// practical step limit of Caplan et al. 2024 has the same purpose). Never below what three stages can do.
+    /// practical step limit of Caplan et al. 2024 has the same purpose). Never below what three stages can do, less
+    /// some rounding that would ask for five.
     fn practical_limit(&mut self, time: f64, t: &[f64], bounds: Bounds, reference: f64) -> Result<f64> {
         let (method, options) = (self.choices.method, &self.choices.options);
         if !method.is_stabilised() || options.stages.is_some() || self.choices.change.is_infinite() {
@@ -118,7 +119,8 @@ impl Motion<'_> {
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
         self.heat.rate(time, t, &mut rate)?;
         let speed = self.norm(|i| rate[i]);
-        Ok((self.choices.change * reference / speed).max(method.limit(bounds)))
+        let least = method.limit(bounds) * (1.0 - 4.0 * f64::EPSILON);
+        Ok((self.choices.change * reference / speed).max(least))
     }
 
     /// The spread of a quantity over the volume.

@@ -1,0 +1,37 @@
+//! The stability suite, as `diffusph study stability` runs it.
+#![cfg(feature = "cli")]
+
+use diffusph::study::stability::{self, Row, Verdict};
+use std::process::Command;
+
+/// Models that some cases wait for; an operator may be absent only while its words are not known.
+const MISSING: &[&str] = &["model radiation", "model dust"];
+
+#[test]
+fn nothing_fails_that_should_pass_and_what_should_fail_does() {
+    let rows = stability::run(&stability::cases(), 1, Box::new(|_| true)).unwrap();
+    let wrong: Vec<&Row> = rows.iter().filter(|r| !r.verdict.is_right()).collect();
+    assert!(wrong.is_empty(), "{wrong:#?}");
+    let absent = rows.iter().filter(|r| r.verdict == Verdict::Absent && r.words.is_empty());
+    assert!(absent.clone().count() > 0 && absent.clone().all(|r| MISSING.contains(&r.reason.as_str())));
+    let failing = rows.iter().filter(|r| r.verdict == Verdict::ExpectedFailure);
+    assert!(failing.clone().count() > 5 && failing.clone().all(|r| !r.reason.is_empty() && !r.seen.is_empty()));
+}
+
+#[test]
+fn there_are_62_cases_each_with_a_number_of_its_own() {
+    let numbers: Vec<u32> = stability::cases().iter().map(|case| case.number).collect();
+    assert_eq!(numbers, (1..=62).collect::<Vec<_>>());
+    for case in stability::cases() {
+        assert!(!case.title.is_empty() && !case.required.is_empty() && !(case.trials)().is_empty(), "{}", case.number);
+    }
+}
+
+#[test]
+fn every_study_is_listed_and_an_unknown_one_is_answered() {
+    let ask = |arguments: &[&str]| Command::new(env!("CARGO_BIN_EXE_diffusph")).args(arguments).output().unwrap();
+    assert!(String::from_utf8_lossy(&ask(&["list", "studies"]).stdout).contains("stability"));
+    let unknown = ask(&["study", "stabilty"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&unknown.stderr).contains("did you mean 'stability'"));
+}
