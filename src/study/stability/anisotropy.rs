@@ -17,7 +17,7 @@ const RATIO: Case = Case {
     source: "Biriukov & Price 2019",
     trials: || {
         let bounded = ["espanol-revenga allow=unstable", "monotone", "limited"].map(pass);
-        [bounded.to_vec(), vec![pass("two-first theta=0.1")]].concat()
+        [bounded.to_vec(), vec![pass("two-first")]].concat()
     },
     check: |setting, seen| every_angle(setting, 1.0 / 3.0, seen),
 };
@@ -67,7 +67,7 @@ pub const CASES: &[Case] = &[
         required: "10 <= T <= 12, energy to 1e-12",
         source: "Sharma & Hammett 2007",
         trials: || {
-            [vec![Trial::fail("operator=two-first theta=0.1", TWO_FIRST)], vec![pass("monotone"), pass("limited")]]
+            [vec![Trial::fail("operator=two-first", TWO_FIRST)], vec![pass("monotone"), pass("limited")]]
                 .concat()
         },
         check: ring,
@@ -93,11 +93,11 @@ fn pass(operator: &str) -> Trial {
 
 fn beyond_3() -> Vec<Trial> {
     let unstable = vec![Trial::fail("operator=espanol-revenga allow=unstable", NOT_POSITIVE)];
-    [unstable, ["monotone", "limited", "two-first theta=0.1"].map(pass).to_vec()].concat()
+    [unstable, ["monotone", "limited", "two-first"].map(pass).to_vec()].concat()
 }
 
 fn tensors() -> Vec<Trial> {
-    ["two-first theta=0.1", "monotone", "limited"].map(pass).to_vec()
+    ["two-first", "monotone", "limited"].map(pass).to_vec()
 }
 
 /// 20 by 20 jittered particles with kappa_par = 1 along b.
