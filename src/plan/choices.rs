@@ -24,7 +24,10 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     ("allow", "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow"),
     ("normalise", "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own)"),
-    ("mean", "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic)"),
+    (
+        "mean",
+        "of kappa between two particles: harmonic, arithmetic or geometric; fronts of kappa(T) into the cold need arithmetic, for the others are 0 where one kappa is (default harmonic)",
+    ),
     ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2 (default rkl2)"),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     (
@@ -37,6 +40,10 @@ pub static WORDS: &[(&str, &str)] = &[
         "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)",
     ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
+    (
+        "tolerance",
+        "most error in time of a sub-step, root mean square, relative to the spread of T; off: dt or stability decides (default off)",
+    ),
     (
         "solver_tolerance",
         "residual of implicit integrators' equations, relative to the change that a stage makes (default 1e-10)",
@@ -72,6 +79,8 @@ pub struct Choices {
     pub options: Options,
     /// Most relative change of T in a sub-step of a stabilised method.
     pub change: f64,
+    /// Most error of a sub-step, relative to the spread of T; none: sub-steps are not controlled.
+    pub tolerance: Option<f64>,
     pub threads: usize,
     pub memory: Option<u64>,
     without: Vec<String>,
@@ -113,6 +122,7 @@ impl Choices {
         };
         let options = options(&mut words)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
+        let tolerance = tolerance(&mut words)?;
         let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
         let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
         let without = without(words.take("without"))?;
@@ -131,6 +141,7 @@ impl Choices {
             method,
             options,
             change,
+            tolerance,
             threads,
             memory,
             without,
@@ -159,6 +170,16 @@ fn options(words: &mut Words) -> Result<Options> {
     options.limits.tolerance = tolerance.unwrap_or(options.limits.tolerance);
     options.limits.iterations = words.count("max_iterations", 1..=1_000_000)?.unwrap_or(options.limits.iterations);
     Ok(options)
+}
+
+fn tolerance(words: &mut Words) -> Result<Option<f64>> {
+    match words.take("tolerance") {
+        None | Some("off") => Ok(None),
+        Some(word) => match word.parse::<f64>() {
+            Ok(v) if v > 0.0 && v < 1.0 => Ok(Some(v)),
+            _ => Err(Error::bad("tolerance", word, "it must be between 0 and 1, or off")),
+        },
+    }
 }
 
 fn without(list: Option<&str>) -> Result<Vec<String>> {
@@ -196,6 +217,7 @@ mod tests {
             ("heat operator=direct integrator=sdirk2", "needs a linear operator that cannot grow: brookshaw"),
             ("heat operator=two-first theta=-1", "theta must be"),
             ("heat solver_tolerance=0", "between 0 and 1"),
+            ("heat tolerance=1", "between 0 and 1, or off"),
         ] {
             let text = Choices::parse(line).err().map(|e| e.to_string()).unwrap_or_default();
             assert!(text.contains(expected), "{line}: {text}");
@@ -220,6 +242,7 @@ mod tests {
             "max_stages=9",
             "bounds=free",
             "max_applications=7",
+            "tolerance=1e-5",
             "solver_tolerance=1e-6",
             "max_iterations=500",
             "threads=1",

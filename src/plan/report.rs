@@ -20,6 +20,8 @@ pub struct Report {
     pub energy_before: f64,
     pub energy: f64,
     pub seconds: f64,
+    /// Sub-steps that were done again, shorter, for `tolerance`.
+    pub rejected: u64,
 }
 
 /// Seconds per pass, summed over the life of a solver.
