@@ -119,3 +119,38 @@ fn bounds_are_kept_by_the_methods_that_keep_them() {
         assert!((report.energy / report.energy_before - 1.0).abs() < 1e-12, "{method}");
     }
 }
+
+#[test]
+fn auto_chooses_by_stiffness_and_the_plan_says_so() {
+    let x = lattice(20, 2, 0.2);
+    let after = |words: &str, stiffness: f64| {
+        let mut s = unit_box(&format!("kernel=M4 integrator=auto {words}"), &x, 2, true);
+        set(&mut s, "T", &field(&x, 2, |p| 2.0 + (2.0 * PI * p[0]).sin()));
+        assert!(s.plan().unwrap().to_string().contains("until a step is known"));
+        let limit = s.limit().unwrap();
+        let report = s.step(stiffness * limit).unwrap();
+        let plan = s.plan().unwrap().to_string();
+        assert!(plan.contains(&format!("auto: {} because dt is", report.integrator)), "{plan}");
+        // The next step is another step.
+        assert_eq!(s.step(0.5 * limit).unwrap().integrator, if words == "bounds=keep" { "ssprk3" } else { "rkl2" });
+        (report.integrator, s.get_all("T").unwrap())
+    };
+    for (words, stiffness, expected) in [
+        ("", 40.0, "rkl2"),
+        ("", 1e6, "sdirk2"),
+        ("tolerance=off", 1e3, "rkl2"),
+        ("tolerance=off", 1e4, "sdirk2"),
+        ("bounds=keep", 40.0, "ssprk3"),
+        ("bounds=keep", 1e3, "backward-euler"),
+    ] {
+        let (integrator, t) = after(words, stiffness);
+        assert_eq!(integrator, expected, "{words} {stiffness}");
+        assert!(t.iter().all(|t| (1.0..=3.0).contains(t)), "{words} {stiffness}");
+    }
+    // What cannot be solved for is stabilised at any stiffness.
+    let mut s = unit_box("kernel=M4 integrator=auto tolerance=off operator=direct", &lattice(20, 2, 0.0), 2, true);
+    set(&mut s, "T", &field(&x, 2, |p| 2.0 + (2.0 * PI * p[0]).sin()));
+    let limit = s.limit().unwrap();
+    assert_eq!(s.step(3e3 * limit).unwrap().integrator, "rkl2");
+    assert!(s.plan().unwrap().to_string().contains("cannot be solved for"));
+}

@@ -1,5 +1,6 @@
 //! The words that a solver is created with, read once.
 
+use super::auto::{self, Auto};
 use super::rules::RULES;
 use crate::error::{Error, Result};
 use crate::integrator::{self, Method, Options};
@@ -28,7 +29,10 @@ pub static WORDS: &[(&str, &str)] = &[
         "mean",
         "of kappa between two particles: harmonic, arithmetic or geometric; fronts of kappa(T) into the cold need arithmetic, for the others are 0 where one kappa is (default harmonic)",
     ),
-    ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2 (default rkl2)"),
+    (
+        "integrator",
+        "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2; auto: rkl2 or, for the stiffest steps, sdirk2, with bounds=keep ssprk3 or backward-euler, at tolerance=1e-3 (default rkl2)",
+    ),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     (
         "change",
@@ -76,6 +80,8 @@ pub struct Choices {
     pub allow_unstable: bool,
     pub mean: Mean,
     pub method: &'static Method,
+    /// The method is chosen anew for each step.
+    pub auto: Option<Auto>,
     pub options: Options,
     /// Most relative change of T in a sub-step of a stabilised method.
     pub change: f64,
@@ -105,7 +111,7 @@ impl Choices {
             Some(word) => choice("normalise", word, &[("pair", true), ("none", false)])?,
         };
         let mean = Mean::find(words.take("mean").unwrap_or("harmonic"))?;
-        let method = integrator::find(words.take("integrator").unwrap_or("rkl2"))?;
+        let (method, auto) = method(words.take("integrator").unwrap_or("rkl2"), line)?;
         if method.is_implicit() && !operator.dissipative {
             let able = table::OPERATORS.iter().filter(|o| o.dissipative).map(|o| o.name).collect::<Vec<_>>().join(", ");
             let rule = format!("integrator={} needs a linear operator that cannot grow: {able}", method.name);
@@ -122,7 +128,7 @@ impl Choices {
         };
         let options = options(&mut words)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
-        let tolerance = tolerance(&mut words)?;
+        let tolerance = tolerance(&mut words, auto.as_ref().map(|_| auto::TOLERANCE))?;
         let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
         let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
         let without = without(words.take("without"))?;
@@ -139,6 +145,7 @@ impl Choices {
             allow_unstable,
             mean,
             method,
+            auto,
             options,
             change,
             tolerance,
@@ -172,9 +179,20 @@ fn options(words: &mut Words) -> Result<Options> {
     Ok(options)
 }
 
-fn tolerance(words: &mut Words) -> Result<Option<f64>> {
+/// A method, and whether it is the first of several.
+fn method(word: &str, line: &str) -> Result<(&'static Method, Option<Auto>)> {
+    if word != "auto" {
+        return Ok((integrator::find(word)?, None));
+    }
+    // It is the default, but only who asks for it wants to pay for it.
+    let auto = Auto::new(line.split_whitespace().any(|word| word == "bounds=keep"));
+    Ok((auto.first()?, Some(auto)))
+}
+
+fn tolerance(words: &mut Words, default: Option<f64>) -> Result<Option<f64>> {
     match words.take("tolerance") {
-        None | Some("off") => Ok(None),
+        None => Ok(default),
+        Some("off") => Ok(None),
         Some(word) => match word.parse::<f64>() {
             Ok(v) if v > 0.0 && v < 1.0 => Ok(Some(v)),
             _ => Err(Error::bad("tolerance", word, "it must be between 0 and 1, or off")),

@@ -100,9 +100,7 @@ impl Motion<'_> {
             return Ok(());
         }
         let start = Instant::now();
-        // For the report alone, so Gershgorin's bound will do.
-        let known = self.known.filter(|_| self.heat.operator_is_fixed());
-        report.limit = explicit_limit(known.map_or_else(|| self.proven_bounds(time, t), Ok)?);
+        report.limit = explicit_limit(self.known_or_proven(time, t)?);
         method.advance(&schedule, &mut self.heat, self.pool, time, t, self.work)?;
         self.timers.add("solve", start.elapsed());
         (report.substeps, report.stages) = (1, schedule.stages.into());
@@ -116,7 +114,7 @@ impl Motion<'_> {
         // No tolerance makes a step possible that is too long for stability alone.
         let bounds = self.stability(time, dt, t)?;
         let mut schedule = method.schedule(dt, bounds, options)?;
-        report.limit = explicit_limit(if method.is_implicit() { self.proven_bounds(time, t)? } else { bounds });
+        report.limit = explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)? } else { bounds });
         let control = Control { method, tolerance };
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
         let mut done = 0.0;
@@ -208,6 +206,12 @@ impl Motion<'_> {
         let least = method.schedule(dt, Bounds { spectral: bounds.diagonal, ..bounds }, options);
         let applications = |s: Result<Schedule>| s.map_or(u64::MAX, |s| s.applications());
         applications(method.schedule(dt, bounds, options)) <= applications(least)
+    }
+
+    /// The best bounds that cost no more than one application: for a report, or a choice between methods.
+    pub fn known_or_proven(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+        let known = self.known.filter(|_| self.heat.operator_is_fixed());
+        known.map_or_else(|| self.proven_bounds(time, t), Ok)
     }
 
     /// Gershgorin's bounds: proven, for any operator and any kappa.

@@ -22,6 +22,8 @@ pub struct Report {
     pub seconds: f64,
     /// Sub-steps that were done again, shorter, for `tolerance`.
     pub rejected: u64,
+    /// The method that took it.
+    pub integrator: &'static str,
 }
 
 /// Seconds per pass, summed over the life of a solver.
