@@ -42,7 +42,7 @@
 #include <stdint.h>
 
 /* The start of every report. */
-#define DIFFUSPH_REPORT_INIT {(int64_t)sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
+#define DIFFUSPH_REPORT_INIT {(int64_t)sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
 
 /**
  * Done.
@@ -265,6 +265,10 @@ typedef struct diffusph_report {
    * Seconds of wall-clock time that it took.
    */
   double seconds;
+  /**
+   * Sub-steps that were done again, shorter, for the tolerance.
+   */
+  int64_t rejected;
 } diffusph_report;
 
 #ifdef __cplusplus

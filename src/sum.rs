@@ -49,6 +49,21 @@ pub fn spread(
     largest * sum(pool, n, |i| weight(i) / total * deviation(i) * deviation(i)).sqrt()
 }
 
+/// The weighted root mean square of `value`, scaled likewise.
+pub fn rms(
+    pool: &Pool,
+    n: usize,
+    weight: impl Fn(usize) -> f64 + Sync + Send,
+    value: impl Fn(usize) -> f64 + Sync + Send,
+) -> f64 {
+    let largest = max(pool, n, |i| value(i).abs());
+    if !largest.is_finite() || largest == 0.0 {
+        return largest.max(0.0);
+    }
+    let total = sum(pool, n, &weight);
+    largest * sum(pool, n, |i| weight(i) / total * (value(i) / largest).powi(2)).sqrt()
+}
+
 /// The first index for which `test` holds.
 pub fn first(pool: &Pool, n: usize, test: impl Fn(usize) -> bool + Sync + Send) -> Option<usize> {
     blocks(pool, n, |mut range| range.find(|&i| test(i))).into_iter().flatten().next()
@@ -84,6 +99,8 @@ mod tests {
             let spread = spread(&pool, 2, |i| [3.0, 1.0][i], |i| scale * [1.0, 3.0][i]);
             assert!((spread / scale - 0.75f64.sqrt()).abs() < 1e-15);
         }
+        let rms = rms(&pool, 2, |i| [3.0, 1.0][i], |i| 1e200 * [1.0, 3.0][i]);
+        assert!((rms / 1e200 - 3f64.sqrt()).abs() < 1e-15);
         assert_eq!(spread(&pool, 2, |_| 1.0, |i| [0.0, f64::INFINITY][i]), f64::INFINITY);
         assert_eq!(spread(&pool, 2, |_| 1.0, |_| 0.0), 0.0);
     }

@@ -33,6 +33,8 @@ pub struct Report {
     pub energy: f64,
     /// Seconds of wall-clock time that it took.
     pub seconds: f64,
+    /// Sub-steps that were done again, shorter, for the tolerance.
+    pub rejected: i64,
 }
 
 impl From<plan::Report> for Report {
@@ -51,6 +53,7 @@ impl From<plan::Report> for Report {
             energy_before: r.energy_before,
             energy: r.energy,
             seconds: r.seconds,
+            rejected: count(r.rejected),
         }
     }
 }

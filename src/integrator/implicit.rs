@@ -2,8 +2,9 @@
 //!
 //! A stage solves Y = base + g rate(t, Y) by defect correction: the true residual F = base + g rate(t, Y) − Y, then
 //! (I − g A) d = F with the linear operator A of the system about Y, then Y + d. Where the rate is linear, one
-//! correction does it and the next residual is the check; where it is not, this is Picard's iteration, or Newton's, as
-//! A is frozen or exact.
+//! correction does it and the next residual is the check; where it is not, this is Picard's iteration, as A is frozen.
+//! A correction that does not lower the residual is taken back by halves (a line search, Dennis & Schnabel 1983, 6.3):
+//! what is left lies between two iterates, and so within their bounds.
 
 use super::krylov::{Equations, Limits, add, unsolved};
 use super::{Linear, Schedule, System, Work};
@@ -33,6 +34,9 @@ const CORRECTIONS: u32 = 100;
 
 /// By how much one correction of a frozen operator lowers the residual: solving further would be undone by the next.
 const FORCING: f64 = 0.05;
+
+/// The smallest share of a correction that is tried.
+const LEAST_SHARE: f64 = 1.0 / 256.0;
 
 /// The residual's rounding in units of (1 + g diagonal) |Y|: one for Y itself and a few for the sum over neighbours.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
@@ -104,8 +108,13 @@ fn solve(
     let n = y.len();
     let (mut spent, mut size, mut change) = (0, 0.0, None);
     let (mut worst, mut wanted) = (f64::INFINITY, 0.0);
+    let mut taken = Taken { share: 0.0, before: f64::INFINITY };
     for _ in 0..CORRECTIONS {
-        system.rate(t, y, residual)?;
+        match system.rate(t, y, residual) {
+            // Where a correction went too far, the rate may not be defined.
+            Err(Error::BadElement { .. } | Error::NotFinite { .. }) if taken.halve(pool, y, correction) => continue,
+            done => done?,
+        }
         pool.chunks(residual, BLOCK, |start, part| {
             part.iter_mut().enumerate().for_each(|(k, f)| *f = base[start + k] + g * *f - y[start + k]);
         });
@@ -128,12 +137,42 @@ fn solve(
         if worst <= wanted || n == 0 {
             return Ok(wanted.max(0.0));
         }
+        if linear == Linear::Frozen && !(worst < taken.before) {
+            if taken.halve(pool, y, correction) {
+                continue;
+            }
+            break;
+        }
         let target = if linear == Linear::Exact { 0.5 * wanted } else { (0.5 * wanted).max(FORCING * worst) };
         let mut equations = Equations { system, pool, g, diagonal, weight };
         spent += equations.solve(target, limits.iterations - spent, [correction, residual, p, q])?;
-        add(pool, y, 1.0, correction);
+        taken = Taken { share: taken.next(), before: worst };
+        add(pool, y, taken.share, correction);
     }
     Err(unsolved(spent, worst, wanted))
+}
+
+/// The share of the last correction that is in y, and the largest residual before it.
+struct Taken {
+    share: f64,
+    before: f64,
+}
+
+impl Taken {
+    /// Takes half of it back; `false` where too little is left.
+    fn halve(&mut self, pool: &Pool, y: &mut [f64], correction: &[f64]) -> bool {
+        let enough = self.share > LEAST_SHARE;
+        if enough {
+            self.share *= 0.5;
+            add(pool, y, -self.share, correction);
+        }
+        enough
+    }
+
+    /// Twice the last share: where one correction had to be cut, the next one does, too.
+    fn next(&self) -> f64 {
+        if self.share > 0.0 { (2.0 * self.share).min(1.0) } else { 1.0 }
+    }
 }
 
 /// Makes Σ weight (Y − y) what was supplied, to rounding, whatever the solver's tolerance: what is amiss is shared by

@@ -1,6 +1,7 @@
 //! Advancing dy/dt = rate(t, y) by explicit, stabilised and implicit Runge-Kutta methods: a table of methods, the
 //! schedule of sub-steps and stages that a step needs, and the sub-step itself. What y is, the integrator does not know.
 
+mod adaptive;
 mod explicit;
 mod implicit;
 mod krylov;
@@ -9,6 +10,7 @@ mod stabilised;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::Pool;
+pub use adaptive::{Adaptive, Control};
 use explicit::Tableau;
 pub use krylov::Limits;
 use stabilised::Recursion;
@@ -344,6 +346,8 @@ impl Work {
     }
 }
 
+#[cfg(test)]
+mod adaptive_tests;
 #[cfg(test)]
 mod implicit_tests;
 #[cfg(test)]

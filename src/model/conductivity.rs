@@ -1,7 +1,14 @@
 //! kappa(T): named laws, or a function of the host's.
 
 use crate::error::{Error, Result};
+use crate::pool::{BLOCK, Pool};
+use crate::sum;
 use crate::words::Words;
+
+/// How far below zero, relative to the largest |T|, a temperature may be and still count as zero where a power of it
+/// does not exist. Methods without a maximum principle undershoot by less at a front; a host that counts from another
+/// zero does not stay within it.
+const UNDERSHOOT: f64 = 0.01;
 
 /// A law kappa(T) given in words.
 #[derive(Debug, Clone, PartialEq)]
@@ -14,7 +21,10 @@ pub enum Law {
 
 /// Every law with its words.
 pub static LAWS: &[(&str, &str)] = &[
-    ("power", "kappa0 (T/T0)^n: 'power kappa0=1 T0=300 n=2.5'; T0 defaults to 1, kappa0 to 1"),
+    (
+        "power",
+        "kappa0 (T/T0)^n: 'power kappa0=1 T0=300 n=2.5'; T0 defaults to 1, kappa0 to 1; fronts into the cold need mean=arithmetic",
+    ),
     ("table", "straight lines between points, constant outside: 'table T=300,400,600 kappa=1,1.2,2'"),
 ];
 
@@ -63,6 +73,22 @@ impl Law {
         Ok(Law::Table { t, kappa })
     }
 
+    /// kappa at all these temperatures.
+    pub fn evaluate(&self, pool: &Pool, t: &[f64], kappa: &mut [f64]) {
+        pool.chunks(kappa, BLOCK, |start, part| {
+            part.iter_mut().zip(&t[start..]).for_each(|(k, &t)| *k = self.at(t));
+        });
+        if sum::first(pool, kappa.len(), |i| !(kappa[i] >= 0.0)).is_none() {
+            return;
+        }
+        let (cold, lowest) = (self.at(0.0), -UNDERSHOOT * sum::max(pool, t.len(), |i| t[i].abs()));
+        pool.chunks(kappa, BLOCK, |start, part| {
+            let undershot =
+                part.iter_mut().zip(&t[start..]).filter(|(k, t)| !(**k >= 0.0) && (lowest..0.0).contains(*t));
+            undershot.for_each(|(k, _)| *k = cold);
+        });
+    }
+
     pub fn at(&self, temperature: f64) -> f64 {
         match self {
             Law::Power { kappa0, t0, n } => kappa0 * (temperature / t0).powf(*n),
@@ -96,6 +122,23 @@ mod tests {
         for (t, k) in [(0.0, 1.0), (300.0, 1.0), (350.0, 1.5), (400.0, 2.0), (500.0, 1.5), (600.0, 1.0), (1e9, 1.0)] {
             assert_eq!(table.at(t), k, "kappa({t})");
         }
+    }
+
+    #[test]
+    fn a_power_of_an_undershoot_is_that_of_zero() {
+        let (pool, mut kappa) = (Pool::new(1).unwrap(), [0.0; 4]);
+        Law::parse("power n=2.5").unwrap().evaluate(&pool, &[4.0, -1e-3, 0.0, 1.0], &mut kappa);
+        assert_eq!(kappa, [32.0, 0.0, 0.0, 1.0]);
+        Law::parse("power n=2.5").unwrap().evaluate(&pool, &[4.0, -1.0, 0.0, 1.0], &mut kappa);
+        assert!(kappa[1].is_nan() && kappa[0] == 32.0);
+        Law::parse("power n=2").unwrap().evaluate(&pool, &[4.0, -0.01, -1.0, 1.0], &mut kappa);
+        assert_eq!(kappa, [16.0, 1e-4, 1.0, 1.0]);
+        let mut table = Law::parse("table T=-1,1 kappa=0,2").unwrap();
+        table.evaluate(&pool, &[4.0, -0.01, -1.0, 1.0], &mut kappa);
+        assert_eq!(kappa, [2.0, 0.99, 0.0, 2.0]);
+        table = Law::parse("power n=-1").unwrap();
+        table.evaluate(&pool, &[4.0, -0.01, -1.0, 1.0], &mut kappa);
+        assert_eq!((kappa[0], kappa[1]), (0.25, f64::INFINITY));
     }
 
     #[test]

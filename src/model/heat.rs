@@ -192,9 +192,7 @@ impl Heat<'_> {
     pub fn kappa_of_t(&mut self, time: f64, t: &[f64]) -> Result<&[f64]> {
         let kappa: &mut [f64] = match &mut self.conductivity {
             Conductivity::Law(law, kappa) => {
-                self.pool.chunks(kappa, BLOCK, |start, part| {
-                    part.iter_mut().zip(&t[start..]).for_each(|(k, &t)| *k = law.at(t));
-                });
+                law.evaluate(self.pool, t, kappa);
                 kappa
             }
             Conductivity::Host(host, kappa) => {

@@ -1,5 +1,6 @@
 //! The words that a solver is created with, read once.
 
+use super::auto::{self, Auto};
 use super::rules::RULES;
 use crate::error::{Error, Result};
 use crate::integrator::{self, Method, Options};
@@ -28,9 +29,12 @@ pub static WORDS: &[(&str, &str)] = &[
     ("normalise", "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own)"),
     (
         "mean",
-        "of kappa between two particles: harmonic, arithmetic or geometric (default harmonic; consistent: arithmetic)",
+        "of kappa between two particles: harmonic, arithmetic or geometric; fronts of kappa(T) into the cold need arithmetic, for the others are 0 where one kappa is (default harmonic; consistent: arithmetic)",
     ),
-    ("integrator", "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2 (default rkl2)"),
+    (
+        "integrator",
+        "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2; auto: rkl2 or, for the stiffest steps, sdirk2, with bounds=keep ssprk3 or backward-euler, at tolerance=1e-3 (default rkl2)",
+    ),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     (
         "change",
@@ -42,6 +46,10 @@ pub static WORDS: &[(&str, &str)] = &[
         "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)",
     ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
+    (
+        "tolerance",
+        "most error in time of a sub-step, root mean square, relative to the spread of T; off: dt or stability decides (default off)",
+    ),
     (
         "solver_tolerance",
         "residual of implicit integrators' equations, relative to the change that a stage makes (default 1e-10)",
@@ -77,9 +85,13 @@ pub struct Choices {
     pub allow_unstable: bool,
     pub mean: Mean,
     pub method: &'static Method,
+    /// The method is chosen anew for each step.
+    pub auto: Option<Auto>,
     pub options: Options,
     /// Most relative change of T in a sub-step of a stabilised method.
     pub change: f64,
+    /// Most error of a sub-step, relative to the spread of T; none: sub-steps are not controlled.
+    pub tolerance: Option<f64>,
     pub threads: usize,
     pub memory: Option<u64>,
     without: Vec<String>,
@@ -110,7 +122,7 @@ impl Choices {
             None => 4,
             Some(word) => choice("order", word, &[("2", 2), ("4", 4), ("6", 6)])?,
         };
-        let method = integrator::find(words.take("integrator").unwrap_or("rkl2"))?;
+        let (method, auto) = method(words.take("integrator").unwrap_or("rkl2"), line)?;
         if method.is_implicit() && !operator.dissipative {
             let able = table::OPERATORS.iter().filter(|o| o.dissipative).map(|o| o.name).collect::<Vec<_>>().join(", ");
             let rule = format!("integrator={} needs a linear operator that cannot grow: {able}", method.name);
@@ -127,6 +139,7 @@ impl Choices {
         };
         let options = options(&mut words)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
+        let tolerance = tolerance(&mut words, auto.as_ref().map(|_| auto::TOLERANCE))?;
         let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
         let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
         let without = without(words.take("without"))?;
@@ -144,8 +157,10 @@ impl Choices {
             allow_unstable,
             mean,
             method,
+            auto,
             options,
             change,
+            tolerance,
             threads,
             memory,
             without,
@@ -174,6 +189,27 @@ fn options(words: &mut Words) -> Result<Options> {
     options.limits.tolerance = tolerance.unwrap_or(options.limits.tolerance);
     options.limits.iterations = words.count("max_iterations", 1..=1_000_000)?.unwrap_or(options.limits.iterations);
     Ok(options)
+}
+
+/// A method, and whether it is the first of several.
+fn method(word: &str, line: &str) -> Result<(&'static Method, Option<Auto>)> {
+    if word != "auto" {
+        return Ok((integrator::find(word)?, None));
+    }
+    // It is the default, but only who asks for it wants to pay for it.
+    let auto = Auto::new(line.split_whitespace().any(|word| word == "bounds=keep"));
+    Ok((auto.first()?, Some(auto)))
+}
+
+fn tolerance(words: &mut Words, default: Option<f64>) -> Result<Option<f64>> {
+    match words.take("tolerance") {
+        None => Ok(default),
+        Some("off") => Ok(None),
+        Some(word) => match word.parse::<f64>() {
+            Ok(v) if v > 0.0 && v < 1.0 => Ok(Some(v)),
+            _ => Err(Error::bad("tolerance", word, "it must be between 0 and 1, or off")),
+        },
+    }
 }
 
 fn without(list: Option<&str>) -> Result<Vec<String>> {
@@ -211,6 +247,7 @@ mod tests {
             ("heat operator=direct integrator=sdirk2", "needs a linear operator that cannot grow: brookshaw"),
             ("heat operator=two-first theta=-1", "theta must be"),
             ("heat solver_tolerance=0", "between 0 and 1"),
+            ("heat tolerance=1", "between 0 and 1, or off"),
         ] {
             let text = Choices::parse(line).err().map(|e| e.to_string()).unwrap_or_default();
             assert!(text.contains(expected), "{line}: {text}");
@@ -236,6 +273,7 @@ mod tests {
             "max_stages=9",
             "bounds=free",
             "max_applications=7",
+            "tolerance=1e-5",
             "solver_tolerance=1e-6",
             "max_iterations=500",
             "threads=1",

@@ -37,6 +37,8 @@ pub struct Facts {
     pub keeps_bounds: bool,
     pub operator: &'static str,
     pub integrator: &'static str,
+    /// What was chosen, and why, where the choice is ours.
+    pub auto: Option<String>,
     /// The integrator solves for its stages.
     pub implicit: bool,
     /// Arrays of n that the integrator holds.

@@ -1,5 +1,6 @@
 //! From a scene to a list of passes: what runs, what was left out and why, in what memory.
 
+pub mod auto;
 pub mod choices;
 pub mod facts;
 pub mod motion;
@@ -116,7 +117,10 @@ impl Plan {
             true => ("solve", "conjugate gradients on rows of weights"),
             false => ("stages", "rows of weights"),
         };
-        let about = format!("{}: {how}", facts.integrator);
+        let about = match &facts.auto {
+            Some(reason) => format!("auto: {reason}; {how}"),
+            None => format!("{}: {how}", facts.integrator),
+        };
         add(name, When::EachStage, facts.buffers * 8.0 * n, pairs, about);
         let mut promises = vec!["finite"];
         if facts.keeps_bounds {

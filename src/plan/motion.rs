@@ -4,7 +4,7 @@ use super::report::{Report, Timers};
 use super::state::Progress;
 use super::{Choices, Plan};
 use crate::error::{Error, Result};
-use crate::integrator::{self, Bounds, Linear, Method, Schedule, System, Work};
+use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Schedule, System, Work};
 use crate::memory;
 use crate::model::heat::{self, Heat};
 use crate::operator::spectrum;
@@ -60,6 +60,9 @@ impl Motion<'_> {
     /// Advances `t` by exactly `dt` from `time`. Where the operator changes with T, bounds and schedule are made anew
     /// for each sub-step.
     pub fn advance(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        if let Some(tolerance) = self.choices.tolerance.filter(|_| dt > 0.0 && !t.is_empty()) {
+            return self.adapt(tolerance, (time, dt), t, report);
+        }
         if self.choices.method.is_implicit() {
             return self.solve(time, dt, t, report);
         }
@@ -97,13 +100,58 @@ impl Motion<'_> {
             return Ok(());
         }
         let start = Instant::now();
-        // For the report alone, so Gershgorin's bound will do.
-        let known = self.known.filter(|_| self.heat.operator_is_fixed());
-        report.limit = explicit_limit(known.map_or_else(|| self.proven_bounds(time, t), Ok)?);
+        report.limit = explicit_limit(self.known_or_proven(time, t)?);
         method.advance(&schedule, &mut self.heat, self.pool, time, t, self.work)?;
         self.timers.add("solve", start.elapsed());
         (report.substeps, report.stages) = (1, schedule.stages.into());
         self.tell(time, dt, dt)
+    }
+
+    /// Sub-steps of the length that a tolerance allows, none longer than is stable.
+    fn adapt(&mut self, tolerance: f64, (time, dt): (f64, f64), t: &mut [f64], report: &mut Report) -> Result<()> {
+        let (method, options) = (self.choices.method, &self.choices.options);
+        let (start, before, volume) = (Instant::now(), self.heat.applications, self.heat.volume);
+        // No tolerance makes a step possible that is too long for stability alone.
+        let bounds = self.stability(time, dt, t)?;
+        let mut schedule = method.schedule(dt, bounds, options)?;
+        report.limit = explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)? } else { bounds });
+        let control = Control { method, tolerance };
+        let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
+        let mut done = 0.0;
+        while done < dt {
+            let (now, rest) = (time + done, dt - done);
+            let part = pace.next(rest);
+            let bounds = self.stability(now, part, t)?;
+            schedule = method.schedule(part, bounds, options)?;
+            if pace.attempt(&schedule, &mut self.heat, now, t, self.work)? {
+                done = if schedule.dt == rest { dt } else { done + schedule.dt };
+                report.substeps += 1;
+                self.tell(time, dt, done)?;
+            }
+            self.refuse_what_does_not_end(&pace, (dt, dt - done), self.heat.applications - before)?;
+        }
+        self.timers.add(if method.is_implicit() { "solve" } else { "stages" }, start.elapsed());
+        (report.stages, report.rejected, self.work.slack) = (schedule.stages.into(), pace.rejected, pace.slack);
+        Ok(())
+    }
+
+    /// What bounds the length of a sub-step: nothing for an implicit method.
+    fn stability(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
+        let calm = Bounds { spectral: 0.0, diagonal: 0.0 };
+        if self.choices.method.is_implicit() { Ok(calm) } else { self.bounds(time, dt, t) }
+    }
+
+    /// Sub-steps may become so short, or so many, that the end is out of reach.
+    fn refuse_what_does_not_end(&self, pace: &Adaptive, (dt, rest): (f64, f64), applications: u64) -> Result<()> {
+        let (allowed, part) = (self.choices.options.max_applications, pace.next(rest));
+        let ahead = if rest > 0.0 { rest / part } else { 0.0 };
+        match pace.failure() {
+            Some(failure) if ahead > allowed as f64 => Err(failure.clone()),
+            _ if applications > allowed || part < f64::EPSILON * rest => {
+                Err(Error::StepTooLarge { dt, needed: applications.saturating_add(ahead as u64), allowed })
+            }
+            _ => Ok(()),
+        }
     }
 
     /// The longest sub-step of a stabilised method in which T changes, at the present rate, by no more than `change`
@@ -160,6 +208,12 @@ impl Motion<'_> {
         let least = method.schedule(dt, Bounds { spectral: bounds.diagonal, ..bounds }, options);
         let applications = |s: Result<Schedule>| s.map_or(u64::MAX, |s| s.applications());
         applications(method.schedule(dt, bounds, options)) <= applications(least)
+    }
+
+    /// The best bounds that cost no more than one application: for a report, or a choice between methods.
+    pub fn known_or_proven(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+        let known = self.known.filter(|_| self.heat.operator_is_fixed());
+        known.map_or_else(|| self.proven_bounds(time, t), Ok)
     }
 
     /// Gershgorin's bounds: proven, for any operator and any kappa.

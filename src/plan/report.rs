@@ -20,6 +20,10 @@ pub struct Report {
     pub energy_before: f64,
     pub energy: f64,
     pub seconds: f64,
+    /// Sub-steps that were done again, shorter, for `tolerance`.
+    pub rejected: u64,
+    /// The method that took it.
+    pub integrator: &'static str,
 }
 
 /// Seconds per pass, summed over the life of a solver.

@@ -36,10 +36,14 @@ impl State {
         if self.choices.without("at_rest") && self.steps > 0 {
             self.forget_geometry();
         }
-        let plan = self.prepare("step")?;
+        let mut plan = self.prepare("step")?;
+        if self.choose(&plan, dt)? {
+            plan = self.prepare("step")?;
+        }
         let (mut t, time, applications) = (self.each(fields::T)?, self.time, self.applications);
         let before = self.before(&plan, &t);
-        let mut report = Report { dt, energy_before: self.energy(&t), ..Report::default() };
+        let integrator = self.choices.method.name;
+        let mut report = Report { dt, integrator, energy_before: self.energy(&t), ..Report::default() };
         self.with_motion(&plan, |motion| motion.advance(time, dt, &mut t, &mut report))?;
         let checked = Instant::now();
         self.check(&plan, &before, &t)?;

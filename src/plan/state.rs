@@ -399,6 +399,7 @@ impl State {
             keeps_bounds: positive && strong_stability && !heated && exchanging == 0,
             operator: choices.operator.name,
             integrator: choices.method.name,
+            auto: choices.auto.as_ref().map(|auto| auto.reason.clone()),
             implicit: choices.method.is_implicit(),
             buffers: self.work.bytes() as f64 / 8.0 / self.len().max(1) as f64,
         }

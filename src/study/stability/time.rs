@@ -124,8 +124,7 @@ pub const CASES: &[Case] = &[
         source: "SWIFT, Diffusion_1D",
         trials: || {
             let null = "first differences do not see a checkerboard, so it never decays";
-            let two_first =
-                vec![Trial::fail("operator=two-first theta=0", null), Trial::pass("operator=two-first")];
+            let two_first = vec![Trial::fail("operator=two-first theta=0", null), Trial::pass("operator=two-first")];
             [trial::operators(""), two_first].concat()
         },
         check: checkerboard,

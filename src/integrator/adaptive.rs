@@ -1,0 +1,226 @@
+//! Sub-steps as long as a tolerance allows, for every method: an estimate of each sub-step's error, and a controller
+//! that takes it or does it again shorter.
+//!
+//! Explicit and stabilised methods of order 1 and 2 are held against the trapezoidal rule, for one rate more: the
+//! estimate of Sommeijer, Shampine & Verwer (J. Comput. Appl. Math. 88, 315, 1998), 0.8 (y_0 − y_1) + 0.4 dt (f_0 +
+//! f_1), exact for methods of order 1 without the 0.8. All others are done once more in two halves, and the halves are
+//! kept (Hairer, Nørsett & Wanner, Solving ODEs I, II.4): implicit methods damp what is too stiff to be resolved, and
+//! such an estimate does too.
+
+use super::{Family, Method, Schedule, System, Work};
+use crate::error::{Error, Result};
+use crate::memory;
+use crate::pool::Pool;
+use crate::sum;
+
+/// How much shorter a sub-step is than the one that would just do.
+const SAFETY: f64 = 0.9;
+
+/// Shortest and longest next sub-step, relative to the last.
+const RANGE: (f64, f64) = (0.1, 5.0);
+
+/// Exponents of the present and of the last error in units of 1/(order + 1): a PI controller, which rejects less often
+/// than one without memory where stiffness sets the pace (Gustafsson 1991; Hairer & Wanner, Solving ODEs II, IV.2).
+const PROPORTIONAL: (f64, f64) = (0.7, 0.4);
+
+/// By how much a sub-step is shortened that failed without an estimate.
+const RETREAT: f64 = 0.25;
+
+/// Differences of so many roundings of y are no error of the method.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// What decides on the length of a sub-step.
+#[derive(Debug, Clone, Copy)]
+pub struct Control {
+    pub method: &'static Method,
+    /// Largest error of a sub-step, as root mean square, relative to the spread of y at the beginning, or to how far y
+    /// has moved since then where that is more.
+    pub tolerance: f64,
+}
+
+/// One step in sub-steps of controlled error.
+pub struct Adaptive<'a> {
+    control: Control,
+    pool: &'a Pool,
+    /// Of the mean.
+    weight: &'a [f64],
+    spread: f64,
+    start: Vec<f64>,
+    trial: Vec<f64>,
+    other: Vec<f64>,
+    rate: Vec<f64>,
+    /// Length of the next sub-step, as far as accuracy is concerned.
+    length: f64,
+    /// Beyond this length a sub-step failed, for this reason.
+    failure: Option<(f64, Error)>,
+    /// Of the last sub-step, in units of what is allowed; none after a rejection.
+    last: Option<f64>,
+    pub rejected: u64,
+    /// How far the sub-steps may be from the solutions of their equations, in sum.
+    pub slack: f64,
+}
+
+impl<'a> Adaptive<'a> {
+    /// Prepares a step of `dt` from (t, y). The first sub-step is the one in which, at the present rate, y moves by
+    /// the share of its spread that the tolerance allows for an error of this order.
+    ///
+    /// # Errors
+    /// `NoMemory`; any error of the system.
+    pub fn new(
+        control: Control,
+        pool: &'a Pool,
+        weight: &'a [f64],
+        system: &mut dyn System,
+        (t, dt): (f64, f64),
+        y: &[f64],
+    ) -> Result<Adaptive<'a>> {
+        let array = || memory::filled("error control", y.len(), 0.0);
+        let (mut rate, start) = (array()?, memory::copied("error control", y)?);
+        system.rate(t, y, &mut rate)?;
+        let spread = sum::spread(pool, y.len(), |i| weight[i], |i| y[i]);
+        let speed = sum::rms(pool, y.len(), |i| weight[i], |i| rate[i]);
+        let guess = control.tolerance.powf(control.exponent()) * (spread / speed);
+        let length = if guess > 0.0 { guess.min(dt) } else { dt };
+        let (trial, other) = (array()?, array()?);
+        let (failure, last, rejected, slack) = (None, None, 0, 0.0);
+        Ok(Adaptive {
+            control,
+            pool,
+            weight,
+            spread,
+            start,
+            trial,
+            other,
+            rate,
+            length,
+            failure,
+            last,
+            rejected,
+            slack,
+        })
+    }
+
+    /// The next sub-step of a step of which `rest` is left: the rest in equal parts.
+    pub fn next(&self, rest: f64) -> f64 {
+        let most = self.failure.as_ref().map_or(f64::INFINITY, |f| f.0);
+        rest / (rest / self.length.min(most)).ceil().max(1.0)
+    }
+
+    /// Why sub-steps are as short as they are, where it is not for their errors.
+    pub fn failure(&self) -> Option<&Error> {
+        self.failure.as_ref().map(|f| &f.1)
+    }
+
+    /// Tries one sub-step of `schedule.dt` from (t, y); says whether y was advanced.
+    ///
+    /// # Errors
+    /// Any error of the system that a shorter sub-step would not mend.
+    pub fn attempt(
+        &mut self,
+        schedule: &Schedule,
+        system: &mut dyn System,
+        t: f64,
+        y: &mut [f64],
+        work: &mut Work,
+    ) -> Result<bool> {
+        let dt = schedule.dt;
+        let error = match self.estimate(schedule, system, t, y, work) {
+            Err(error) if shorter_may_do(&error) => {
+                self.failure = Some((RETREAT * dt, error));
+                f64::INFINITY
+            }
+            other => other?,
+        };
+        let accepted = error <= 1.0;
+        self.length = dt * self.factor(error);
+        if accepted {
+            y.copy_from_slice(&self.trial);
+            std::mem::swap(&mut self.rate, &mut self.other);
+            self.slack += work.slack;
+            self.last = Some(error);
+        } else {
+            self.rejected += 1;
+            self.last = None;
+        }
+        Ok(accepted)
+    }
+
+    /// By what the length of a sub-step changes after this error.
+    fn factor(&self, error: f64) -> f64 {
+        let (exponent, (present, past)) = (self.control.exponent(), PROPORTIONAL);
+        let error = error.max(f64::MIN_POSITIVE);
+        match self.last {
+            _ if !error.is_finite() => RANGE.0,
+            _ if error > 1.0 => (SAFETY * error.powf(-exponent)).max(RANGE.0),
+            Some(last) if last > 0.0 => {
+                let memory = last.powf(past * exponent);
+                (SAFETY * error.powf(-present * exponent) * memory).clamp(RANGE.0, RANGE.1)
+            }
+            _ => (SAFETY * error.powf(-exponent)).clamp(RANGE.0, RANGE.1),
+        }
+    }
+
+    /// Leaves the advanced y in `trial`, and returns its error in units of what is allowed.
+    fn estimate(
+        &mut self,
+        schedule: &Schedule,
+        system: &mut dyn System,
+        t: f64,
+        y: &[f64],
+        work: &mut Work,
+    ) -> Result<f64> {
+        self.trial.copy_from_slice(y);
+        let method = self.control.method;
+        let (pool, dt) = (self.pool, schedule.dt);
+        let Some(scale) = method.trapezoidal() else {
+            let half = Schedule { dt: 0.5 * dt, ..*schedule };
+            method.advance(&half, system, pool, t, &mut self.trial, work)?;
+            let slack = work.slack;
+            method.advance(&half, system, pool, t + half.dt, &mut self.trial, work)?;
+            let slack = slack + work.slack;
+            self.other.copy_from_slice(y);
+            method.advance(schedule, system, pool, t, &mut self.other, work)?;
+            work.slack = slack;
+            let share = 1.0 / (2f64.powi(method.order as i32) - 1.0);
+            return Ok(self.measure(|i| share * (self.trial[i] - self.other[i])));
+        };
+        method.advance(schedule, system, pool, t, &mut self.trial, work)?;
+        system.rate(t + dt, &self.trial, &mut self.other)?;
+        Ok(self.measure(|i| scale * ((y[i] - self.trial[i]) + 0.5 * dt * (self.rate[i] + self.other[i]))))
+    }
+
+    fn measure(&self, error: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
+        let (pool, n, weight) = (self.pool, self.trial.len(), |i: usize| self.weight[i]);
+        let moved = sum::rms(pool, n, weight, |i| self.trial[i] - self.start[i]);
+        let size = sum::max(pool, n, |i| self.trial[i].abs()).max(0.0);
+        let allowed = self.control.tolerance * self.spread.max(moved) + ROUNDING * size;
+        let error = sum::rms(pool, n, weight, error);
+        if error == 0.0 { 0.0 } else { error / allowed }
+    }
+}
+
+impl Control {
+    /// Of the error of a sub-step, in its length: 1 over this.
+    fn exponent(&self) -> f64 {
+        1.0 / f64::from(self.method.order + 1)
+    }
+}
+
+impl Method {
+    /// What the difference from the trapezoidal rule is multiplied by to estimate the error; `None` where the method is
+    /// better than that rule, or applied to what is too stiff for it.
+    fn trapezoidal(&self) -> Option<f64> {
+        match (&self.family, self.order) {
+            (Family::Implicit(_), _) => None,
+            (_, 1) => Some(1.0),
+            (_, 2) => Some(0.8),
+            _ => None,
+        }
+    }
+}
+
+/// Whether an error may be one of the sub-step's length: equations unsolved, or a kappa asked for at a stage that
+/// overshoots.
+fn shorter_may_do(error: &Error) -> bool {
+    matches!(error, Error::NotConverged { .. } | Error::NotFinite { .. } | Error::BadElement { .. })
+}
