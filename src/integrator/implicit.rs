@@ -41,6 +41,10 @@ const LEAST_SHARE: f64 = 1.0 / 256.0;
 /// The residual's rounding in units of (1 + g diagonal) |Y|: one for Y itself and a few for the sum over neighbours.
 const ROUNDING: f64 = 4.0 * f64::EPSILON;
 
+/// By how much the residual may rise from one correction to the next before the correction is cut: where a front opens cold
+/// particles, it rises once and falls for good.
+const RISE: f64 = 4.0;
+
 /// Beyond this rounding, relative to |Y|, a residual says nothing.
 const ILLEGIBLE: f64 = 0.1;
 
@@ -137,7 +141,7 @@ fn solve(
         if worst <= wanted || n == 0 {
             return Ok(wanted.max(0.0));
         }
-        if linear == Linear::Frozen && !(worst < taken.before) {
+        if linear == Linear::Frozen && !(worst < RISE * taken.before) {
             if taken.halve(pool, y, correction) {
                 continue;
             }

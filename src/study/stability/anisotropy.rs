@@ -17,7 +17,7 @@ const RATIO: Case = Case {
     source: "Biriukov & Price 2019",
     trials: || {
         let bounded = ["espanol-revenga allow=unstable", "monotone", "limited"].map(pass);
-        [bounded.to_vec(), vec![pass("two-first")]].concat()
+        [bounded.to_vec(), vec![pass("two-first theta=0.3")]].concat()
     },
     check: |setting, seen| every_angle(setting, 1.0 / 3.0, seen),
 };
@@ -92,7 +92,7 @@ fn pass(operator: &str) -> Trial {
 
 fn beyond_3() -> Vec<Trial> {
     let unstable = vec![Trial::fail("operator=espanol-revenga allow=unstable", NOT_POSITIVE)];
-    [unstable, ["monotone", "limited", "two-first"].map(pass).to_vec()].concat()
+    [unstable, ["monotone", "limited", "two-first theta=0.3"].map(pass).to_vec()].concat()
 }
 
 fn tensors() -> Vec<Trial> {
