@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::solver::catalogue::{CATALOGUES, Item};
-use crate::study::{exact::SOLUTIONS, keys::KEYS, lattice::LATTICES};
+use crate::study::{catalogue::STUDIES, exact::SOLUTIONS, keys::KEYS, lattice::LATTICES};
 use std::fmt::Write;
 
 /// Lists of the program, beside those of the solver.
@@ -11,6 +11,7 @@ static OWN: &[(&str, &str)] = &[
     ("demo", "the scene that comes with the program, to start from: list demo > my.toml"),
     ("exact", "exact solutions, with their parameters"),
     ("lattices", "lattices of particles"),
+    ("studies", "what 'diffusph study' measures"),
 ];
 
 /// A list, or all of them by name.
@@ -25,6 +26,7 @@ pub fn text(name: Option<&str>) -> Result<String> {
         (Some("demo"), _) => super::DEFAULT_SCENE.to_string(),
         (Some("exact"), _) => exact(),
         (Some("lattices"), _) => table(LATTICES.iter().map(|l| (l.name, l.about))),
+        (Some("studies"), _) => table(STUDIES.iter().map(|s| (s.name, s.about))),
         (None, _) => {
             let names = |(name, list): &(&'static str, fn() -> Vec<Item>)| {
                 (*name, list().iter().map(|i| i.name.as_str()).collect::<Vec<_>>().join(", "))

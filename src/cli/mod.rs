@@ -1,12 +1,13 @@
 //! The program: what it is asked, what it answers, and how it ends.
 //!
-//! Exit codes: 0 done; 1 it failed (a file, the numbers, the machine); 2 it was asked something that it cannot mean
+//! Exit codes: 0 done; 1 it failed (a file, the numbers, the machine, a study's finding); 2 it was asked something that it cannot mean
 //! (a word, a key, an argument); 130 it was interrupted.
 
 mod check;
 mod interrupt;
 mod list;
 mod progress;
+mod study;
 
 use crate::error::{Error, Result};
 use crate::study::run::Study;
@@ -57,6 +58,8 @@ enum Command {
         /// A .vtu, .vtp, .pvtu, .pvtp or legacy .vtk file
         file: PathBuf,
     },
+    /// Measure what the library promises: stability, …; exit code 1 where something is not as it should be
+    Study(study::StudyArgs),
 }
 
 #[derive(Args)]
@@ -88,13 +91,14 @@ impl SceneArgs {
 /// Runs the program with the arguments of the process.
 pub fn main() -> ExitCode {
     let done = match Program::parse().command {
-        Command::Run { scene, json, out } => run(&scene, json, &out),
-        Command::Plan { scene } => scene.study().and_then(|mut study| print(study.plan()?.to_string())),
-        Command::List { name } => list::text(name.as_deref()).and_then(print),
-        Command::Check { file } => check::text(&file).and_then(print),
+        Command::Run { scene, json, out } => run(&scene, json, &out).map(success),
+        Command::Plan { scene } => scene.study().and_then(|mut study| print(study.plan()?.to_string())).map(success),
+        Command::List { name } => list::text(name.as_deref()).and_then(print).map(success),
+        Command::Check { file } => check::text(&file).and_then(print).map(success),
+        Command::Study(args) => study::run(&args),
     };
     match done {
-        Ok(()) => ExitCode::SUCCESS,
+        Ok(code) => code,
         Err(error) => {
             let message = match error {
                 Error::Cancelled => "interrupted; the snapshots listed so far are complete".to_string(),
@@ -105,6 +109,10 @@ pub fn main() -> ExitCode {
             ExitCode::from(exit_code(&error))
         }
     }
+}
+
+fn success((): ()) -> ExitCode {
+    ExitCode::SUCCESS
 }
 
 fn run(args: &SceneArgs, json: bool, out: &Path) -> Result<()> {

@@ -11,7 +11,11 @@
 //! | `choose` | the particles that a mark is for |
 //! | `run` | the run and its snapshots |
 //! | `report` | accuracy against run time |
+//! | `catalogue` | studies of the library itself, by name |
+//! | `stability` | cases that break solvers |
 
+#[cfg(feature = "cli")]
+pub mod catalogue;
 #[cfg(feature = "cli")]
 mod choose;
 pub mod exact;
@@ -26,4 +30,6 @@ pub mod run;
 pub mod scene;
 #[cfg(feature = "cli")]
 mod setup;
+#[cfg(feature = "cli")]
+pub mod stability;
 pub mod surface;

@@ -1,0 +1,50 @@
+//! `diffusph study`: what the library knows about itself, measured again.
+
+use super::{interrupt, print, progress};
+use crate::error::{Error, Result};
+use crate::io::atomic;
+use crate::study::catalogue::{self, Answer, Request};
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
+#[derive(clap::Args)]
+pub struct StudyArgs {
+    /// Which study ('list studies' shows them)
+    name: String,
+    /// Report as JSON
+    #[arg(long)]
+    json: bool,
+    /// Write NAME.txt and NAME.json into this folder as well
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// With more particles, and for as long as that takes
+    #[arg(long)]
+    full: bool,
+}
+
+/// Runs a study and prints its answer; exit code 1 where something is not as it should be.
+///
+/// # Errors
+/// `UnknownWord`, `Io`, `Cancelled`, and what the study itself answers.
+pub fn run(args: &StudyArgs) -> Result<ExitCode> {
+    let study = catalogue::find(&args.name)?;
+    interrupt::listen();
+    let answer = (study.run)(Request { full: args.full, watch: progress::watch() })?;
+    let json =
+        serde_json::to_string_pretty(&answer.json).map_err(|e| Error::bad("--json", e, "report this, please"))?;
+    if let Some(folder) = &args.out {
+        write(folder, study.name, &answer, &json)?;
+    }
+    print(if args.json { json + "\n" } else { answer.text })?;
+    Ok(if answer.failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn write(folder: &Path, name: &str, answer: &Answer, json: &str) -> Result<()> {
+    let failed = |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
+    std::fs::create_dir_all(folder).map_err(failed)?;
+    for (ending, text) in [("txt", answer.text.as_str()), ("json", json)] {
+        atomic::replace(&folder.join(name).with_extension(ending), |sink| sink.write_all(text.as_bytes()))?;
+    }
+    Ok(())
+}

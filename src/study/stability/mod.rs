@@ -1,0 +1,100 @@
+//! The stability suite: cases that break solvers, as data, and a small runner that tries each of them with every method
+//! where it applies.
+//!
+//! | file | what it holds |
+//! |---|---|
+//! | `mod` | what a case is, and the runner |
+//! | `trial` | the words that a case is tried with |
+//! | `seen` | what was measured, beside its bounds |
+//! | `setting` | particles and solvers that several cases use |
+//! | `table` | the rows as text and as JSON |
+//! | `time`, `implicit` | steps of any length; what implicit solves promise |
+//!
+//! A case is a row of [`cases`]. What a method cannot do by its nature is a trial that is expected to fail, with the
+//! reason; that it does fail is part of the suite.
+
+mod implicit;
+mod seen;
+mod setting;
+mod table;
+mod time;
+mod trial;
+
+use super::catalogue::{Answer, Request};
+use super::run::Watch;
+use crate::error::{Error, Result};
+pub use seen::Seen;
+pub use setting::Setting;
+pub use table::{Row, Verdict};
+pub use trial::{Expect, Trial};
+
+/// One row of the suite.
+pub struct Case {
+    pub number: u32,
+    pub title: &'static str,
+    /// What a correct solver must do.
+    pub required: &'static str,
+    /// Who met it before, where somebody did.
+    pub source: &'static str,
+    pub trials: fn() -> Vec<Trial>,
+    /// Measures; an error is a failure, with its message as what was seen.
+    pub check: fn(&Setting, &mut Seen) -> Result<()>,
+}
+
+/// Thread counts that must give the same bits.
+const THREADS: [usize; 2] = [1, 3];
+
+/// Every case in order of its number. Add a case to the list of its theme.
+pub fn cases() -> Vec<&'static Case> {
+    let mut all: Vec<&Case> = [time::CASES, implicit::CASES].into_iter().flatten().collect();
+    all.sort_by_key(|case| case.number);
+    all
+}
+
+/// Tries every case with all its words. `scale` multiplies the number of particles along each axis.
+///
+/// # Errors
+/// `Cancelled` when `watch` says so. That a case fails is not an error but a row.
+pub fn run(cases: &[&Case], scale: usize, mut watch: Watch) -> Result<Vec<Row>> {
+    let todo: Vec<(&Case, Trial)> =
+        cases.iter().flat_map(|case| (case.trials)().into_iter().map(|t| (*case, t))).collect();
+    let mut rows = Vec::new();
+    for (case, trial) in &todo {
+        if !watch(rows.len() as f64 / todo.len() as f64) {
+            return Err(Error::Cancelled);
+        }
+        rows.push(Row::new(case, trial, attempt(case, trial, scale)));
+    }
+    Ok(rows)
+}
+
+/// What was seen; none where the words are not known yet.
+fn attempt(case: &Case, trial: &Trial, scale: usize) -> Option<Seen> {
+    if trial.is_absent() {
+        return None;
+    }
+    let look = |threads: usize| {
+        let mut seen = Seen::default();
+        if let Err(e) = (case.check)(&Setting { words: trial.words.clone(), scale, threads }, &mut seen) {
+            seen.require(&format!("an answer: {e}"), false);
+        }
+        seen
+    };
+    let [mut seen, other] = THREADS.map(look);
+    if seen.bits != other.bits {
+        seen.require("the same with more threads", false);
+    }
+    Some(seen)
+}
+
+/// The suite as a study.
+///
+/// # Errors
+/// As [`run`].
+pub fn answer(request: Request) -> Result<Answer> {
+    let rows = run(&cases(), if request.full { 2 } else { 1 }, request.watch)?;
+    table::answer(&rows)
+}
+
+#[cfg(test)]
+mod tests;
