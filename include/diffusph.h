@@ -357,7 +357,8 @@ int32_t diffusph_set_particles(struct diffusph_solver *s,
 
 /**
  * A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. "x" moves
- * the particles.
+ * the particles; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
+ * xy; xx, yy, zz, xy, yz, xz).
  *
  * \param name   which
  * \param data   values; particle i at data[i * stride]

@@ -37,6 +37,11 @@ impl<'a> Strided<'a> {
         self.components
     }
 
+    /// One component of every item.
+    pub fn component(&self, component: usize) -> Strided<'a> {
+        Strided { data: self.data.get(component..).unwrap_or(&[]), components: 1, ..*self }
+    }
+
     pub fn at(&self, item: usize, component: usize) -> f64 {
         self.data[item * self.stride + component]
     }

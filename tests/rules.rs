@@ -32,6 +32,7 @@ const SCENES: &[Scene] = &[
     Scene { rule: "at_rest", words: "kernel=M4", set: kappa_by_place, steps: &[3.0, 3.0, 7.0] },
     Scene { rule: "same_h", words: "kernel=M6", set: nothing, steps: &[5.0] },
     Scene { rule: "uniform_kappa", words: "kernel=M4 mean=geometric", set: nothing, steps: &[5.0, 1.0] },
+    Scene { rule: "isotropic", words: "kernel=M4 operator=espanol-revenga", set: kappa_by_place, steps: &[5.0] },
     Scene { rule: "frozen", words: "kernel=M4", set: kappa_by_place, steps: &[5.0] },
     Scene { rule: "no_wall", words: "kernel=M4", set: nothing, steps: &[5.0] },
     Scene { rule: "no_source", words: "kernel=M4", set: nothing, steps: &[5.0] },

@@ -72,7 +72,8 @@ pub unsafe extern "C" fn diffusph_set_particles(
 }
 
 /// A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. "x" moves
-/// the particles.
+/// the particles; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
+/// xy; xx, yy, zz, xy, yz, xz).
 ///
 /// \param name   which
 /// \param data   values; particle i at data[i * stride]
@@ -94,8 +95,12 @@ pub unsafe extern "C" fn diffusph_set(
     unsafe {
         with(s, |inside| {
             let name = text("name", name)?;
-            let vector = fields::field(name).is_ok_and(|f| f.vector);
-            let components = if vector { inside.solver.dim() } else { 1 };
+            let (dim, vector) = (inside.solver.dim(), fields::field(name).is_ok_and(|f| f.vector));
+            let components = match fields::group(name, dim) {
+                Some(slots) => slots.len(),
+                None if vector => dim,
+                None => 1,
+            };
             inside.solver.set(name, strided(name, data, n, stride, components)?)
         })
     }

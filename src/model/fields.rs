@@ -81,6 +81,17 @@ pub static FIELDS: &[Field] = &[
     input("emissivity", "-", NonNegative, Some(0.0), "radiative exchange emissivity sigma_SB (T_ambient^4 - T^4)"),
     input("T_ambient", "K", Finite, Some(0.0), "temperature of the surroundings; absolute where there is emissivity"),
     input("area", "m^2", NonNegative, None, "area that faces outside; without it, one face of a cube, V^((nu-1)/nu)"),
+    input("kappa_par", "W/(m K)", NonNegative, None, "conductivity along b; with kappa_perp and b in place of kappa"),
+    input("kappa_perp", "W/(m K)", NonNegative, None, "conductivity across b (without it, 0)"),
+    input("b_x", "-", Finite, None, "direction of kappa_par, of any length and sign; 0: kappa_perp in all directions"),
+    input("b_y", "-", Finite, None, "its second component"),
+    input("b_z", "-", Finite, None, "its third component"),
+    input("kappa_xx", "W/(m K)", NonNegative, None, "symmetric tensor in place of kappa; components not set are 0"),
+    input("kappa_yy", "W/(m K)", NonNegative, None, "its second diagonal component"),
+    input("kappa_zz", "W/(m K)", NonNegative, None, "its third diagonal component"),
+    input("kappa_xy", "W/(m K)", Finite, None, "its component xy"),
+    input("kappa_yz", "W/(m K)", Finite, None, "its component yz"),
+    input("kappa_xz", "W/(m K)", Finite, None, "its component xz"),
     vector(output("x", "m", "position, inside the box on periodic axes")),
     output("u", "J/kg", "energy per mass, c_v T; setting it sets T"),
     output("rate", "W/kg", "du/dt from diffusion, surface and source"),
@@ -91,6 +102,7 @@ pub static FIELDS: &[Field] = &[
     output("omega", "-", "grad-h factor"),
     vector(output("grad_T", "K/m", "temperature gradient, exact for linear fields")),
     vector(output("flux", "W/m^2", "heat flux -kappa grad T")),
+    vector(output("b", "-", "b_x, b_y, b_z as one vector; setting it sets them")),
 ];
 
 /// Position of an input in [`FIELDS`] and in a solver's storage.
@@ -109,7 +121,28 @@ pub const H_CONV: Slot = 9;
 pub const EMISSIVITY: Slot = 10;
 pub const T_AMBIENT: Slot = 11;
 pub const AREA: Slot = 12;
-pub const INPUTS: usize = 13;
+pub const KAPPA_PAR: Slot = 13;
+pub const KAPPA_PERP: Slot = 14;
+/// The first of three.
+pub const B: Slot = 15;
+/// The first of six: xx, yy, zz, xy, yz, xz.
+pub const KAPPA_IJ: Slot = 18;
+pub const INPUTS: usize = 24;
+
+/// Inputs that make the conductivity a tensor.
+pub const TENSOR: std::ops::Range<Slot> = KAPPA_PAR..INPUTS;
+
+/// Several inputs that a host may set at once, as the components of one array: the name, and their slots in `dim`
+/// dimensions.
+pub fn group(name: &str, dim: usize) -> Option<Vec<Slot>> {
+    match (name, dim) {
+        ("b", _) => Some((B..B + dim).collect()),
+        ("kappa_ij", 1) => Some(vec![KAPPA_IJ]),
+        ("kappa_ij", 2) => Some(vec![KAPPA_IJ, KAPPA_IJ + 1, KAPPA_IJ + 3]),
+        ("kappa_ij", _) => Some((KAPPA_IJ..KAPPA_IJ + 6).collect()),
+        _ => None,
+    }
+}
 
 /// A single number of a solver.
 pub struct Number {
@@ -140,6 +173,7 @@ pub static NUMBERS: &[Number] = &[
     result("spectral_bound", "1/s", "upper bound on the operator's largest rate"),
     result("smallest_weight", "m^(nu-2)", "smallest pair weight V_a V_b w_ab; negative where positivity is lost"),
     result("mean_neighbours", "-", "mean number of neighbours"),
+    result("negative_pairs", "-", "pairs with a negative weight, both directions counted"),
     result("K_d2_min", "-", "smallest second moment of the operator"),
     result("K_d2_max", "-", "largest second moment of the operator"),
     result("bytes", "bytes", "memory held for particles and weights"),
@@ -190,6 +224,17 @@ mod tests {
             (EMISSIVITY, "emissivity"),
             (T_AMBIENT, "T_ambient"),
             (AREA, "area"),
+            (KAPPA_PAR, "kappa_par"),
+            (KAPPA_PERP, "kappa_perp"),
+            (B, "b_x"),
+            (B + 1, "b_y"),
+            (B + 2, "b_z"),
+            (KAPPA_IJ, "kappa_xx"),
+            (KAPPA_IJ + 1, "kappa_yy"),
+            (KAPPA_IJ + 2, "kappa_zz"),
+            (KAPPA_IJ + 3, "kappa_xy"),
+            (KAPPA_IJ + 4, "kappa_yz"),
+            (KAPPA_IJ + 5, "kappa_xz"),
         ];
         assert_eq!(named.len(), INPUTS);
         for (at, name) in named {

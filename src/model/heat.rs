@@ -109,7 +109,8 @@ impl Heat<'_> {
 
     /// Whether the rate is a linear function of T.
     pub fn is_linear(&self) -> bool {
-        !matches!(self.release, Release::Host(..)) && self.operator_is_fixed()
+        let limited = matches!(self.pairs, Pairs::Twice(twice, _) if twice.is_limited());
+        !limited && !matches!(self.release, Release::Host(..)) && self.operator_is_fixed()
     }
 
     /// Whether the operator stays the same while T changes.
@@ -146,6 +147,7 @@ impl Heat<'_> {
         match self.pairs {
             Pairs::Fresh(assembly) => assembly.apply(self.pool, kappa, t, rate, finish)?,
             Pairs::Stored(matrix) => matrix.apply(self.pool, kappa, t, rate, self.quiet, finish),
+            Pairs::Twice(twice, matrix) => twice.apply(matrix, self.pool, kappa, t, rate, finish)?,
         }
         Ok(())
     }
@@ -153,10 +155,13 @@ impl Heat<'_> {
     /// For each particle the radius and the centre's size of its Gershgorin circle, in 1/s. Needs stored weights.
     pub fn circles(&mut self, time: f64, t: &[f64]) -> Result<Vec<(f64, f64)>> {
         self.kappa_of_t(time, t)?;
-        let Pairs::Stored(matrix) = self.pairs else {
-            return Err(Error::OutOfOrder { call: "a bound".into(), missing: "stored weights".into() });
+        let mut circles = match self.pairs {
+            Pairs::Stored(matrix) => matrix.circles(self.pool, self.pair_kappa())?,
+            Pairs::Twice(twice, matrix) => twice.circles(matrix, self.pool, self.pair_kappa())?,
+            Pairs::Fresh(_) => {
+                return Err(Error::OutOfOrder { call: "a bound".into(), missing: "stored weights".into() });
+            }
         };
-        let mut circles = matrix.circles(self.pool, self.pair_kappa())?;
         for ((radius, centre), inverse) in circles.iter_mut().zip(self.inverse_capacity) {
             let scale = self.factor() * inverse;
             (*radius, *centre) = (*radius * scale, *centre * scale);

@@ -4,6 +4,7 @@ pub mod conductivity;
 pub mod fields;
 pub mod heat;
 pub mod surface;
+pub mod tensor;
 
 /// A model and what a host may read about it.
 pub struct Model {
@@ -12,4 +13,4 @@ pub struct Model {
 }
 
 pub static MODELS: &[Model] =
-    &[Model { name: "heat", about: "rho c_v dT/dt = div(kappa grad T) + source, with scalar kappa" }];
+    &[Model { name: "heat", about: "rho c_v dT/dt = div(kappa grad T) + source, with kappa a number or a tensor" }];

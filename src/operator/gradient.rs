@@ -40,7 +40,7 @@ fn of_row(f: &[f64], dim: usize, inverse: f64, slope: &[f64], volume: &[f64], ro
     [gradient[0], gradient[1], gradient[2]]
 }
 
-fn pseudo_inverse(m: Matrix3<f64>) -> Matrix3<f64> {
+pub(super) fn pseudo_inverse(m: Matrix3<f64>) -> Matrix3<f64> {
     let eigen = m.symmetric_eigen();
     let largest = eigen.eigenvalues.max();
     let inverse = eigen.eigenvalues.map(|v| if v > FLAT * largest { 1.0 / v } else { 0.0 });

@@ -202,15 +202,59 @@ impl Matrix {
 
     /// Number of stored neighbours of a particle.
     pub fn neighbours(&self, i: usize) -> usize {
+        self.columns(i).len()
+    }
+
+    /// The stored neighbours of a particle.
+    pub fn columns(&self, i: usize) -> &[u32] {
         let block = &self.blocks[i / BLOCK];
-        let k = i - block.first;
-        (block.start[k + 1] - block.start[k]) as usize
+        &block.col[block.row(i - block.first).1]
+    }
+
+    /// Their coefficients.
+    pub fn coefficients(&self, i: usize) -> &[f64] {
+        let block = &self.blocks[i / BLOCK];
+        &block.coef[block.row(i - block.first).1]
+    }
+
+    /// Replaces each coefficient by the mean of itself and its mate's, g_ba. Rows must list each other.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn symmetrise(&mut self, pool: &Pool) -> Result<()> {
+        let made = pool.map(self.blocks.len(), |b| {
+            let block = &self.blocks[b];
+            let mut coef = memory::copied("matrix coefficients", &block.coef)?;
+            for k in 0..block.len() {
+                let (i, range) = block.row(k);
+                for at in range {
+                    // The n-th image of b in a's row is the mate of the n-th of a in b's: their sums are what counts.
+                    let j = block.col[at];
+                    let before = self.columns(i)[..at - block.start[k] as usize].iter().filter(|c| **c == j).count();
+                    let mut mates = self.columns(j as usize).iter().zip(self.coefficients(j as usize));
+                    if let Some((_, mate)) = mates.by_ref().filter(|(c, _)| **c as usize == i).nth(before) {
+                        coef[at] = 0.5 * (coef[at] + mate);
+                    }
+                }
+            }
+            Ok(coef)
+        });
+        for (block, coef) in self.blocks.iter_mut().zip(made) {
+            block.coef = coef?;
+        }
+        Ok(())
     }
 
     /// The smallest coefficient; negative where the operator breaks positivity on some pair.
     pub fn smallest(&self, pool: &Pool) -> f64 {
         let of_block = |b: usize| self.blocks[b].coef.iter().copied().fold(f64::INFINITY, f64::min);
         pool.map(self.blocks.len(), of_block).into_iter().fold(f64::INFINITY, f64::min)
+    }
+
+    /// How many coefficients are negative.
+    pub fn negative(&self, pool: &Pool) -> usize {
+        let of_block = |b: usize| self.blocks[b].coef.iter().filter(|c| **c < 0.0).count();
+        pool.map(self.blocks.len(), of_block).into_iter().sum()
     }
 
     /// The first particle with a coefficient that is not a finite number.

@@ -9,6 +9,9 @@
 //!
 //! so energy is exchanged in equal and opposite parts, constants are kept exactly, and where w ≥ 0 a maximum principle
 //! holds.
+//!
+//! Where the conductivity is a tensor kappa S (tr S = nu), an operator either turns S into weights of pairs ([`once`]) or
+//! takes a gradient, a flux and a divergence ([`twice`]).
 
 pub mod gradient;
 pub mod matrix;
@@ -16,9 +19,14 @@ pub mod mean;
 pub mod moments;
 pub mod once;
 pub mod spectrum;
+mod stencils;
 pub mod table;
+pub mod tensor;
+pub mod twice;
 
 pub use matrix::Matrix;
 pub use mean::Mean;
 pub use once::{Assembly, Pairs};
 pub use table::Operator;
+pub use tensor::Sym;
+pub use twice::Twice;

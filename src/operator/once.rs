@@ -5,7 +5,10 @@
 //! sums. Rows are gathered by their owner in a fixed order.
 
 use super::matrix::{Block, Matrix, Seen, row_sum};
-use super::{Mean, Operator};
+use super::table::Tensor;
+use super::tensor::{self, Sym};
+use super::twice::Twice;
+use super::{Mean, Operator, moments, stencils};
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::memory;
@@ -13,6 +16,7 @@ use crate::pool::{BLOCK, Pool};
 use crate::space::{Row, Scratch, rows::Rows};
 
 /// What a row of weights is made from.
+#[derive(Clone, Copy)]
 pub struct Assembly<'a> {
     pub operator: &'static Operator,
     pub kernel: &'a Kernel,
@@ -21,6 +25,8 @@ pub struct Assembly<'a> {
     pub volume: &'a [f64],
     /// One kernel evaluation per pair: every h is the same.
     pub same_h: bool,
+    /// How each particle conducts by direction, trace nu; none where all are isotropic.
+    pub shape: Option<&'a [Sym]>,
 }
 
 /// Buffers of one worker for rows of weights.
@@ -54,7 +60,25 @@ impl Assembly<'_> {
                 *w = 0.5 * (*w + *other * inverse(j).powi(power));
             }
         }
+        match (self.operator.tensor, self.shape) {
+            (Tensor::Angular(factor), Some(shape)) => self.turn(row, shape, factor, w),
+            (Tensor::Stencils, _) => stencils::fit(self, row, w),
+            _ => {}
+        }
         Ok(w)
+    }
+
+    /// Multiplies weights by the angular factor of the mean of both particles' tensors. Coincident particles have no
+    /// direction: theirs is the isotropic weight.
+    fn turn(&self, row: &Row, shape: &[Sym], factor: fn(f64, f64) -> f64, w: &mut [f64]) {
+        let nu = self.kernel.dim() as f64;
+        for (k, (w, &j)) in w.iter_mut().zip(row.j).enumerate() {
+            let e = row.direction(k);
+            if e != [0.0; 3] {
+                let along = 0.5 * (tensor::along(&shape[row.i], e) + tensor::along(&shape[j as usize], e));
+                *w *= factor(along, nu);
+            }
+        }
     }
 
     /// The stored matrix, and the local second moment K_a = Σ_b V_b r² w_ab / (2 nu) of each particle, which is 1 for
@@ -71,7 +95,12 @@ impl Assembly<'_> {
             blocks.push(block);
             moments.extend_from_slice(&k);
         }
-        Ok((Matrix::new(n, blocks), moments))
+        let mut matrix = Matrix::new(n, blocks);
+        if matches!(self.operator.tensor, Tensor::Stencils) {
+            matrix.symmetrise(pool)?;
+            moments = moments::second(self, &matrix, pool)?;
+        }
+        Ok((matrix, moments))
     }
 
     /// As [`Matrix::apply`], with weights that are made for this one application and not kept: the same bits.
@@ -159,4 +188,6 @@ impl Buffers {
 pub enum Pairs<'a> {
     Stored(&'a Matrix),
     Fresh(&'a Assembly<'a>),
+    /// Two sweeps, over the pairs of a matrix.
+    Twice(&'a Twice, &'a Matrix),
 }

@@ -7,12 +7,48 @@ use crate::kernel::Kernel;
 pub struct Operator {
     pub name: &'static str,
     pub about: &'static str,
-    /// w ≥ 0 for every pair: the operator keeps a maximum principle and cannot have growing modes.
+    /// w ≥ 0 for every pair, whatever kappa: the operator keeps a maximum principle and cannot have growing modes.
     pub positive: bool,
     /// Whether `normalise=pair` is the default.
     pub normalise: bool,
+    /// Symmetric and without growing modes on any particles: implicit integrators may solve with it.
+    pub dissipative: bool,
+    /// What it makes of a conductivity that is a tensor.
+    pub tensor: Tensor,
     /// Fills `w` from distances `q`; `spare` is a buffer of the same length.
     pub weight: fn(kernel: &Kernel, q: &[f64], w: &mut [f64], spare: &mut [f64]),
+}
+
+/// How an operator takes a tensor kappa S, tr S = nu.
+#[derive(Debug, Clone, Copy)]
+pub enum Tensor {
+    /// It does not.
+    Scalar,
+    /// The weight of a pair is multiplied by a function of r̂·S r̂ and nu, which is 1 for S = I.
+    Angular(fn(along: f64, nu: f64) -> f64),
+    /// Positive weights fitted to S particle by particle.
+    Stencils,
+    /// Gradient, flux, divergence: two sweeps over the pairs. The weights of pairs serve its stabiliser. `limited`: no
+    /// exchange may make a new extremum.
+    Twice { limited: bool },
+}
+
+/// Brookshaw's weight, -2 F/r.
+fn brookshaw(kernel: &Kernel, q: &[f64], w: &mut [f64], _: &mut [f64]) {
+    kernel.slope_over_q(q, w);
+    w.iter_mut().for_each(|w| *w *= -2.0);
+}
+
+/// The kernel itself, A W/h².
+fn kernel_itself(kernel: &Kernel, q: &[f64], w: &mut [f64], _: &mut [f64]) {
+    kernel.w(q, w);
+    let a = kernel.laplacian_factor();
+    w.iter_mut().for_each(|w| *w *= a);
+}
+
+/// ((nu + 2) r̂·S r̂ − tr S)/2: 1 for S = I.
+fn espanol_revenga(along: f64, nu: f64) -> f64 {
+    0.5 * ((nu + 2.0) * along - nu)
 }
 
 pub static OPERATORS: &[Operator] = &[
@@ -20,36 +56,85 @@ pub static OPERATORS: &[Operator] = &[
         name: "brookshaw",
         about: "w = -2 F/r, F = dW/dr (Brookshaw 1985); symmetric, conservative, positive",
         positive: true,
+        dissipative: true,
         normalise: true,
-        weight: |kernel, q, w, _| {
-            kernel.slope_over_q(q, w);
-            w.iter_mut().for_each(|w| *w *= -2.0);
-        },
+        tensor: Tensor::Scalar,
+        weight: brookshaw,
     },
     Operator {
         name: "kernel",
         about: "the kernel itself as its Laplacian, w = A W/h^2 with A = 2 nu / <r^2> (Biriukov & Price 2019); \
                 symmetric, conservative, positive",
         positive: true,
+        dissipative: true,
         normalise: true,
-        weight: |kernel, q, w, _| {
-            kernel.w(q, w);
-            let a = kernel.laplacian_factor();
-            w.iter_mut().for_each(|w| *w *= a);
-        },
+        tensor: Tensor::Scalar,
+        weight: kernel_itself,
     },
     Operator {
         name: "direct",
         about: "the second derivative of the kernel, w = W'' + (nu - 1) F/r; symmetric and conservative but not \
                 positive: has growing modes on disordered particles",
         positive: false,
+        dissipative: false,
         normalise: false,
+        tensor: Tensor::Scalar,
         weight: |kernel, q, w, spare| {
             kernel.curvature(q, w);
             kernel.slope_over_q(q, spare);
             let other_axes = kernel.dim() as f64 - 1.0;
             w.iter_mut().zip(spare).for_each(|(w, slope)| *w += other_axes * *slope);
         },
+    },
+    Operator {
+        name: "espanol-revenga",
+        about: "tensor kappa: w = -((nu + 2) r.kappa.r - tr kappa) F/r (Espanol & Revenga 2003); symmetric, conservative, \
+                positive only while kappa_par <= 3 kappa_perp",
+        positive: false,
+        dissipative: false,
+        normalise: true,
+        tensor: Tensor::Angular(espanol_revenga),
+        weight: brookshaw,
+    },
+    Operator {
+        name: "espanol-revenga-kernel",
+        about: "tensor kappa: Espanol & Revenga's angular factor on the kernel itself in place of -2 F/r (Biriukov & Price \
+                2019); as espanol-revenga otherwise",
+        positive: false,
+        dissipative: false,
+        normalise: true,
+        tensor: Tensor::Angular(espanol_revenga),
+        weight: kernel_itself,
+    },
+    Operator {
+        name: "two-first",
+        about: "tensor kappa: gradient, flux and its exact adjoint divergence, with a penalty theta on what the gradients \
+                do not explain; symmetric, conservative, never grows, hardly leaks across b; not monotone",
+        positive: false,
+        dissipative: true,
+        normalise: true,
+        tensor: Tensor::Twice { limited: false },
+        weight: brookshaw,
+    },
+    Operator {
+        name: "limited",
+        about: "tensor kappa: two-first, its exchanges limited pair by pair so that no new extremum appears (nonlinear); \
+                conservative, monotone, hardly leaks across b",
+        positive: true,
+        dissipative: false,
+        normalise: true,
+        tensor: Tensor::Twice { limited: true },
+        weight: brookshaw,
+    },
+    Operator {
+        name: "monotone",
+        about: "tensor kappa: positive pair weights nearest to Brookshaw's that have its moments; symmetric, conservative, \
+                monotone at any anisotropy; leaks across b",
+        positive: true,
+        dissipative: true,
+        normalise: true,
+        tensor: Tensor::Stencils,
+        weight: brookshaw,
     },
 ];
 

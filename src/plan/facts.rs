@@ -25,6 +25,12 @@ pub struct Facts {
     pub rate_only: bool,
     /// Weights are scaled by their own moments, which must be known first.
     pub normalised: bool,
+    /// kappa is a tensor, not the same in all directions.
+    pub tensor: bool,
+    /// The operator takes a gradient and a divergence.
+    pub twice: bool,
+    /// Weights of pairs are fitted particle by particle.
+    pub fitted: bool,
     /// The operator has no negative weight.
     pub positive: bool,
     /// The integrator promises the maximum principle, and nothing heats.

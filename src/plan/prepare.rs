@@ -3,13 +3,16 @@
 
 use super::Plan;
 use super::motion::Motion;
-use super::state::{Geometry, Input, State, Weights};
+use super::state::{Directions, Geometry, Input, State, Weights};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Slot};
 use crate::model::heat::{Conductivity, Heat, Release};
 use crate::model::surface::{Exchange, Surface};
-use crate::operator::{Assembly, Pairs};
+use crate::model::tensor::Tensor;
+use crate::operator::table::{self, OPERATORS, Tensor as Form};
+use crate::operator::twice::Recipe;
+use crate::operator::{Assembly, Matrix, Pairs, Sym, Twice, tensor};
 use crate::space::{Cloud, density, rows::Rows};
 use std::borrow::Cow;
 
@@ -27,6 +30,7 @@ impl State {
     /// As [`State::prepare_geometry`].
     pub fn plan(&mut self) -> Result<Plan> {
         self.prepare_geometry("plan")?;
+        self.prepare_directions("plan")?;
         Ok(Plan::new(&self.choices, &self.facts()))
     }
 
@@ -50,9 +54,10 @@ impl State {
         for slot in [fields::T, fields::M] {
             self.need(slot, call)?;
         }
-        if !self.kappa_of_t() {
+        if !self.kappa_of_t() && !self.has_tensor() {
             self.need(fields::KAPPA, call)?;
         }
+        self.prepare_directions(call)?;
         let plan = self.plan()?;
         self.prepare_capacity()?;
         self.prepare_surface(&plan)?;
@@ -63,6 +68,38 @@ impl State {
         let set = self.inputs[slot] != Input::Unset || self.is_empty();
         let missing = || format!("{} ({})", FIELDS[slot].name, FIELDS[slot].about);
         if set { Ok(()) } else { Err(Error::OutOfOrder { call: call.into(), missing: missing() }) }
+    }
+
+    /// The tensor conductivity, where the host has given one, and whether the operator can take it.
+    fn prepare_directions(&mut self, call: &str) -> Result<()> {
+        if self.directions.is_some() || !self.has_tensor() {
+            return Ok(());
+        }
+        let (n, dim, choices) = (self.cloud(call)?.len(), self.dim(), &self.choices);
+        let set = |slot: Slot| self.inputs[slot] != Input::Unset;
+        let at = |slot: Slot, i: usize| self.inputs[slot].at(i).unwrap_or(0.0);
+        let Some(tensor) = Tensor::read(n, dim, set, at, |i| self.host(i))? else { return Ok(()) };
+        let isotropic = tensor.is_isotropic(dim);
+        match choices.operator.tensor {
+            Form::Scalar if !isotropic => {
+                let able = OPERATORS.iter().filter(|o| !matches!(o.tensor, Form::Scalar)).map(|o| o.name);
+                let rule = format!("it takes no tensor kappa; use {}", able.collect::<Vec<_>>().join(", "));
+                return Err(Error::bad("operator", choices.operator.name, &rule));
+            }
+            Form::Angular(_) if !choices.allow_unstable => {
+                if let Some(i) = tensor.beyond_espanol_revenga(dim) {
+                    let value = format!("{:?} times {}", tensor.shape[i], tensor.kappa[i]);
+                    let rule = "more anisotropic than kappa_par = 3 kappa_perp, so weights of pairs across b are negative \
+                                and modes may grow: use operator=limited, two-first or monotone, or insist with \
+                                allow=unstable";
+                    return Err(Error::bad_at("kappa", self.host(i), value, rule));
+                }
+            }
+            _ => {}
+        }
+        let shape = if isotropic { Vec::new() } else { tensor.shape };
+        self.directions = Some(Directions { kappa: Input::compressed(tensor.kappa), shape });
+        Ok(())
     }
 
     /// Smoothing lengths, densities and volumes, given or computed, on cells that fit them.
@@ -141,6 +178,14 @@ impl State {
         }
     }
 
+    /// kappa as an array; a number is repeated.
+    fn each_kappa(&self) -> Result<Vec<f64>> {
+        match self.kappa().view(self.len())? {
+            Cow::Borrowed(v) => memory::copied("kappa", v),
+            Cow::Owned(v) => Ok(v),
+        }
+    }
+
     /// Calls `work` with the rows of neighbours. Needs the geometry.
     pub fn with_rows<T>(&self, work: impl FnOnce(&Rows) -> Result<T>) -> Result<T> {
         let cloud = self.cloud("a search")?;
@@ -152,14 +197,30 @@ impl State {
     pub fn with_assembly<T>(&self, same_h: bool, work: impl FnOnce(&Assembly) -> Result<T>) -> Result<T> {
         let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
         let (operator, kernel) = (self.choices.operator, &self.choices.kernel);
-        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h }))
+        let units = self.unit_shape()?;
+        let shape = self.shape(&units);
+        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h, shape }))
     }
 
-    /// The conductivity of each particle at its temperature.
+    /// Shapes of isotropic particles, where `without=isotropic` asks for them; else empty.
+    fn unit_shape(&self) -> Result<Vec<Sym>> {
+        let wanted = self.choices.without("isotropic");
+        memory::filled("shapes", if wanted { self.len() } else { 0 }, tensor::unit(self.dim()))
+    }
+
+    fn shape<'a>(&'a self, units: &'a [Sym]) -> Option<&'a [Sym]> {
+        let own = self.directions.as_ref().map_or(&[][..], |d| &d.shape);
+        [own, units].into_iter().find(|s| !s.is_empty())
+    }
+
+    /// The conductivity of each particle at its temperature, the mean over directions.
     pub fn kappa_now(&mut self) -> Result<Vec<f64>> {
         if !self.kappa_of_t() {
-            self.need(fields::KAPPA, "get kappa")?;
-            return self.each(fields::KAPPA);
+            self.prepare_directions("get kappa")?;
+            if self.directions.is_none() {
+                self.need(fields::KAPPA, "get kappa")?;
+            }
+            return self.each_kappa();
         }
         let plan = self.prepare("get kappa")?;
         let (t, time) = (self.each(fields::T)?, self.time);
@@ -175,16 +236,57 @@ impl State {
         let (mut matrix, moments) = self.with_assembly(plan.leaves_out("same_h"), |a| a.store(&self.pool))?;
         self.timers.add("weights", start.elapsed());
         if self.choices.normalise {
-            let inverse = memory::collected("normalisation", moments.iter().map(|&k| 1.0 / k.max(LEAST_MOMENT)))?;
-            self.timers.time("normalise", || {
-                matrix.scale(&self.pool, |a, b| 0.5 * (inverse[a] + inverse[b]));
-            });
+            let start = std::time::Instant::now();
+            self.normalise(&mut matrix, &moments)?;
+            self.timers.add("normalise", start.elapsed());
         }
         if let (Some(i), Some(cloud)) = (matrix.first_bad(&self.pool), &self.cloud) {
             let what = "a pair weight".to_string();
             return Err(Error::NotFinite { what, index: cloud.host[i] as usize, value: f64::NAN });
         }
-        self.weights = Some(Weights { matrix, moments, folded: false });
+        let twice = match self.choices.operator.tensor {
+            Form::Twice { limited } => Some(self.make_twice(plan, limited)?),
+            _ => None,
+        };
+        self.weights = Some(Weights { matrix, twice, moments, folded: false });
+        Ok(())
+    }
+
+    /// What an operator of two sweeps holds beside the weights of pairs.
+    fn make_twice(&mut self, plan: &Plan, limited: bool) -> Result<Twice> {
+        let start = std::time::Instant::now();
+        let (mass, same_h, choices) = (self.each(fields::M)?, plan.leaves_out("same_h"), &self.choices);
+        let low = match limited {
+            true => Some(self.monotone_weights(same_h)?),
+            false => None,
+        };
+        let plain = if choices.corrected { None } else { Some(self.inverse_density(&mass)?) };
+        let recipe = Recipe { mass: &mass, plain: plain.as_deref(), theta: choices.theta, low };
+        let made = self.with_assembly(same_h, |assembly| Twice::store(assembly, recipe, &self.pool))?;
+        self.timers.add("weights", start.elapsed());
+        Ok(made)
+    }
+
+    /// The operator `monotone` on these particles, whatever the one that was chosen.
+    fn monotone_weights(&self, same_h: bool) -> Result<Matrix> {
+        let operator = table::find("monotone")?;
+        let fitted = |a: &Assembly| Assembly { operator, ..*a }.store(&self.pool);
+        let (mut matrix, moments) = self.with_assembly(same_h, fitted)?;
+        self.normalise(&mut matrix, &moments)?;
+        Ok(matrix)
+    }
+
+    /// 1/(Omega rho)
+    fn inverse_density(&self, mass: &[f64]) -> Result<Vec<f64>> {
+        let omega = self.with_rows(|rows| density::omega(&self.choices.kernel, rows, mass, &self.pool))?;
+        let rho = self.geometry.as_ref().map_or(&[][..], |g| &g.rho);
+        memory::collected("densities", omega.iter().zip(rho).map(|(omega, rho)| 1.0 / (omega * rho)))
+    }
+
+    /// Scales pairs by the mean of 1/K_a and 1/K_b.
+    fn normalise(&self, matrix: &mut Matrix, moments: &[f64]) -> Result<()> {
+        let inverse = memory::collected("normalisation", moments.iter().map(|&k| 1.0 / k.max(LEAST_MOMENT)))?;
+        matrix.scale(&self.pool, |a, b| 0.5 * (inverse[a] + inverse[b]));
         Ok(())
     }
 
@@ -201,7 +303,7 @@ impl State {
 
     fn fold_kappa(&mut self, plan: &Plan) -> Result<()> {
         let fold = plan.leaves_out("frozen") && !plan.leaves_out("uniform_kappa");
-        let kappa = if fold { self.each(fields::KAPPA)? } else { Vec::new() };
+        let kappa = if fold { self.each_kappa()? } else { Vec::new() };
         let (pool, mean) = (&self.pool, self.choices.mean);
         if let Some(weights) = self.weights.as_mut().filter(|w| fold && !w.folded) {
             self.timers.time("fold", || weights.matrix.scale(pool, |a, b| mean.of(kappa[a], kappa[b])));
@@ -251,6 +353,7 @@ impl State {
     /// Calls `work` with the right-hand side and what it takes to move it. Needs [`State::prepare`].
     pub fn with_motion<T>(&mut self, plan: &Plan, work: impl FnOnce(&mut Motion) -> Result<T>) -> Result<T> {
         let n = self.len();
+        let units = self.unit_shape()?;
         let uniform = plan.leaves_out("uniform_kappa");
         let mut evaluated = memory::filled("kappa", if self.kappa_of_t() { n } else { 0 }, 0.0)?;
         let mut released = memory::filled("source", if self.source_host.is_some() { n } else { 0 }, 0.0)?;
@@ -261,9 +364,10 @@ impl State {
         let each = |slot: Slot, wanted: bool| self.inputs[slot].view(if wanted { n } else { 0 });
         let folded = self.weights.as_ref().is_some_and(|w| w.folded);
         let by_pair = !uniform && self.law.is_none() && self.kappa_host.is_none() && !folded;
-        let kappa = each(fields::KAPPA, by_pair)?;
+        let kappa_given = self.directions.as_ref().map_or(&self.inputs[fields::KAPPA], |d| &d.kappa);
+        let kappa = kappa_given.view(if by_pair { n } else { 0 })?;
         let source = each(fields::SOURCE, !plan.leaves_out("no_source"))?;
-        let conductivity = match (&mut self.kappa_host, &self.law, &self.inputs[fields::KAPPA]) {
+        let conductivity = match (&mut self.kappa_host, &self.law, kappa_given) {
             (Some(host), ..) => Conductivity::Host(host, &mut evaluated),
             (None, Some(law), _) => Conductivity::Law(law, &mut evaluated),
             (None, None, Input::Number(k)) if uniform => Conductivity::Number(*k),
@@ -277,12 +381,15 @@ impl State {
         };
         let (rows, assembly);
         let pairs = match &self.weights {
+            Some(Weights { matrix, twice: Some(twice), .. }) => Pairs::Twice(twice, matrix),
             Some(weights) => Pairs::Stored(&weights.matrix),
             None => {
                 rows = Rows::new(cloud, &g.h, self.choices.kernel.radius(), &self.pool)?;
                 let (operator, kernel, same_h) =
                     (self.choices.operator, &self.choices.kernel, plan.leaves_out("same_h"));
-                assembly = Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h };
+                let own = self.directions.as_ref().map_or(&[][..], |d| &d.shape);
+                let shape = [own, &units].into_iter().find(|s| !s.is_empty());
+                assembly = Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h, shape };
                 Pairs::Fresh(&assembly)
             }
         };

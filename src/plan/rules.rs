@@ -51,10 +51,16 @@ pub static RULES: &[Rule] = &[
         holds: |f| f.uniform_kappa,
     },
     Rule {
+        name: "isotropic",
+        reason: "kappa is the same in all directions: no angular factor, no tensor in the fluxes",
+        same: Same::Rounding,
+        holds: |f| !f.tensor,
+    },
+    Rule {
         name: "frozen",
         reason: "kappa does not change: its averages are folded into the weights",
         same: Same::Bits,
-        holds: |f| !f.uniform_kappa && !f.kappa_of_t && !f.kappa_changes,
+        holds: |f| !f.uniform_kappa && !f.kappa_of_t && !f.kappa_changes && !f.twice,
     },
     Rule {
         name: "no_wall",
@@ -67,7 +73,7 @@ pub static RULES: &[Rule] = &[
         name: "quiet_rows",
         reason: "blocks of particles whose T and whose neighbours' T are all equal contribute exactly zero",
         same: Same::Bits,
-        holds: |f| f.n > crate::pool::BLOCK,
+        holds: |f| f.n > crate::pool::BLOCK && !f.twice,
     },
     Rule {
         name: "one_stage",
@@ -91,7 +97,7 @@ pub static RULES: &[Rule] = &[
         name: "used_once",
         reason: "weights that serve one rate of moving particles are applied as they are made, and not stored",
         same: Same::Bits,
-        holds: |f| f.rate_only && f.moves && !f.normalised,
+        holds: |f| f.rate_only && f.moves && !f.normalised && !f.twice && !f.fitted,
     },
     Rule {
         name: "positive",

@@ -11,7 +11,8 @@ use crate::model::conductivity::Law;
 use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
 use crate::model::heat::Callback;
 use crate::model::surface::Surface;
-use crate::operator::Matrix;
+use crate::operator::table::Tensor;
+use crate::operator::{Matrix, Sym, Twice};
 use crate::pool::Pool;
 use crate::space::{Cloud, Domain};
 use std::borrow::Cow;
@@ -52,6 +53,14 @@ impl Input {
         }
     }
 
+    /// One number where all values are the same.
+    pub fn compressed(values: Vec<f64>) -> Input {
+        match values.first() {
+            Some(&first) if values.iter().all(|&v| v == first) => Input::Number(first),
+            _ => Input::Each(values),
+        }
+    }
+
     fn bytes(&self) -> u64 {
         if let Input::Each(v) = self { memory::bytes(v) } else { 0 }
     }
@@ -67,9 +76,18 @@ pub struct Geometry {
     pub neighbours: f64,
 }
 
+/// A tensor conductivity, as a number and a shape for each particle in internal order.
+pub struct Directions {
+    pub kappa: Input,
+    /// Empty where all particles are isotropic.
+    pub shape: Vec<Sym>,
+}
+
 /// The stored operator.
 pub struct Weights {
     pub matrix: Matrix,
+    /// What operators of two sweeps hold beside the weights of pairs.
+    pub twice: Option<Twice>,
     /// K_a before normalisation.
     pub moments: Vec<f64>,
     /// The averages of kappa are in the coefficients.
@@ -93,6 +111,8 @@ pub struct State {
     pub progress: Option<Progress>,
     pub cancel: Arc<AtomicBool>,
 
+    /// Made from the inputs of a tensor, where there are any.
+    pub directions: Option<Directions>,
     pub geometry: Option<Geometry>,
     /// The smoothing lengths found last, in the host's order: where particles move a little, the next are near.
     pub last_h: Vec<f64>,
@@ -125,6 +145,7 @@ impl State {
             source_host: None,
             progress: None,
             cancel: Arc::default(),
+            directions: None,
             geometry: None,
             last_h: Vec::new(),
             weights: None,
@@ -223,7 +244,7 @@ impl State {
             }
         }
         self.cloud = Some(cloud);
-        (self.inverse_capacity, self.surface) = (None, None);
+        (self.inverse_capacity, self.surface, self.directions) = (None, None, None);
         Ok(())
     }
 
@@ -247,10 +268,17 @@ impl State {
         if self.inputs[slot] == input {
             return;
         }
+        if slot == fields::KAPPA {
+            fields::TENSOR.for_each(|slot| self.inputs[slot] = Input::Unset);
+        }
+        if fields::TENSOR.contains(&slot) {
+            self.inputs[fields::KAPPA] = Input::Unset;
+        }
         self.inputs[slot] = input;
         match slot {
             fields::M | fields::RHO | fields::H => self.drop_geometry(),
-            fields::KAPPA => self.drop_kappa(),
+            fields::KAPPA if self.directions.is_none() => self.drop_kappa(),
+            slot if slot == fields::KAPPA || fields::TENSOR.contains(&slot) => self.drop_directions(),
             fields::C_V | fields::FIXED => (self.inverse_capacity, self.bounds) = (None, None),
             fields::FLUX_IN | fields::H_CONV | fields::EMISSIVITY | fields::T_AMBIENT | fields::AREA => {
                 (self.surface, self.bounds) = (None, None);
@@ -278,6 +306,22 @@ impl State {
         if self.weights.as_ref().is_some_and(|w| w.folded) {
             self.weights = None;
         }
+    }
+
+    /// The tensor changed, and with it all weights.
+    fn drop_directions(&mut self) {
+        (self.directions, self.weights) = (None, None);
+        self.drop_kappa();
+    }
+
+    /// kappa as one number for each particle: as given, or the mean over directions.
+    pub fn kappa(&self) -> &Input {
+        self.directions.as_ref().map_or(&self.inputs[fields::KAPPA], |d| &d.kappa)
+    }
+
+    /// Whether the host has given a tensor.
+    pub fn has_tensor(&self) -> bool {
+        fields::TENSOR.into_iter().any(|slot| self.inputs[slot] != Input::Unset)
     }
 
     /// kappa(T) by a law or by the host's function; neither goes back to the field.
@@ -329,6 +373,9 @@ impl State {
     pub fn facts(&self) -> Facts {
         let choices = &self.choices;
         let (heated, exchanging) = (self.heated(), self.exchanging());
+        // Espanol & Revenga's weights were checked, unless the host insists.
+        let turned = matches!(choices.operator.tensor, Tensor::Angular(_)) && !choices.allow_unstable;
+        let positive = choices.operator.positive || turned;
         let strong_stability = choices.method.ssp > 0.0 && choices.options.keep_bounds;
         Facts {
             n: self.len(),
@@ -338,15 +385,18 @@ impl State {
             finds_h: self.inputs[fields::H] == Input::Unset && self.inputs[fields::RHO] == Input::Unset,
             sums_rho: self.inputs[fields::RHO] == Input::Unset,
             moves: self.moves,
-            uniform_kappa: !self.kappa_of_t() && matches!(self.inputs[fields::KAPPA], Input::Number(_)),
+            uniform_kappa: !self.kappa_of_t() && matches!(self.kappa(), Input::Number(_)),
             kappa_of_t: self.kappa_of_t(),
             kappa_changes: self.kappa_changes,
             exchanging,
             heated,
             rate_only: self.rates > 0 && self.steps == 0,
             normalised: choices.normalise,
-            positive: choices.operator.positive,
-            keeps_bounds: choices.operator.positive && strong_stability && !heated && exchanging == 0,
+            tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
+            twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
+            fitted: matches!(choices.operator.tensor, Tensor::Stencils),
+            positive,
+            keeps_bounds: positive && strong_stability && !heated && exchanging == 0,
             operator: choices.operator.name,
             integrator: choices.method.name,
             implicit: choices.method.is_implicit(),
@@ -357,7 +407,10 @@ impl State {
     /// Bytes held for particles and weights.
     pub fn bytes(&self) -> u64 {
         let geometry = self.geometry.as_ref().map_or(0, |g| 8 * (g.h.len() + g.rho.len() + g.volume.len()) as u64);
-        let weights = self.weights.as_ref().map_or(0, |w| w.matrix.bytes() + memory::bytes(&w.moments));
+        let weights = self
+            .weights
+            .as_ref()
+            .map_or(0, |w| w.matrix.bytes() + memory::bytes(&w.moments) + w.twice.as_ref().map_or(0, Twice::bytes));
         let inputs: u64 = self.inputs.iter().map(Input::bytes).sum();
         let capacity = self.inverse_capacity.as_ref().map_or(0, memory::bytes);
         self.cloud.as_ref().map_or(0, Cloud::bytes)

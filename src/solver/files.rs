@@ -29,7 +29,10 @@ impl Solver {
     pub fn write_vtk_with(&mut self, path: impl AsRef<Path>, options: Options, extra: &[&str]) -> Result<()> {
         let path = path.as_ref();
         let mut names = ALWAYS.to_vec();
-        let each = |slot: &usize| matches!(self.state.inputs[*slot], Input::Each(_));
+        let each = |slot: &usize| match &self.state.inputs[*slot] {
+            Input::Each(_) => true,
+            given => fields::TENSOR.contains(slot) && *given != Input::Unset,
+        };
         names.extend((0..INPUTS).filter(each).map(|slot| FIELDS[slot].name).chain(extra.iter().copied()));
         let mut fields = Vec::new();
         for (at, &name) in names.iter().enumerate() {

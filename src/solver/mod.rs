@@ -122,6 +122,13 @@ impl Solver {
             expect("x", values.len(), self.len(), "one position per particle")?;
             return self.set_particles(values);
         }
+        if let Some(slots) = fields::group(name, self.dim()) {
+            expect(name, values.components(), slots.len(), "one component for each")?;
+            self.state.cloud("set")?;
+            let parts = || slots.iter().enumerate().map(|(c, &slot)| (slot, FIELDS[slot].name, values.component(c)));
+            parts().try_for_each(|(slot, name, part)| check(slot, name, &part, self.len()))?;
+            return parts().collect::<Vec<_>>().into_iter().try_for_each(|(_, name, part)| self.set(name, part));
+        }
         let energy = name == "u";
         let slot = if energy { fields::T } else { fields::slot(name)? };
         let cloud = self.state.cloud("set")?;

@@ -5,7 +5,7 @@ use crate::array::StridedMut;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Field, Slot};
-use crate::operator::{gradient, moments};
+use crate::operator::{gradient, moments, tensor};
 use crate::plan::state::{Input, State, Weights};
 use crate::space::density;
 
@@ -67,6 +67,10 @@ impl Solver {
                 prepared(state)?;
                 state.weights.as_ref().map_or(0.0, |w| w.matrix.smallest(&state.pool))
             }
+            "negative_pairs" => {
+                prepared(state)?;
+                state.weights.as_ref().map_or(0.0, |w| w.matrix.negative(&state.pool) as f64)
+            }
             "mean_neighbours" => {
                 let n = state.len().max(1) as f64;
                 prepared(state)?.matrix.pairs() as f64 / n
@@ -95,9 +99,11 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
         "grad_T" => return gradient_of_t(state),
         "flux" => {
             let (mut flux, kappa) = (gradient_of_t(state)?, state.kappa_now()?);
+            turn(state, &mut flux);
             flux.iter_mut().for_each(|g| g.iter_mut().zip(&kappa).for_each(|(g, k)| *g *= -k));
             return Ok(flux);
         }
+        "b" => return (0..state.dim()).map(|a| given(state, fields::B + a)).collect(),
         "rho" => memory::copied("rho", &geometry(state)?.rho)?,
         "h" => memory::copied("h", &geometry(state)?.h)?,
         "area" => {
@@ -150,6 +156,15 @@ fn gradient_of_t(state: &mut State) -> Result<Vec<Vec<f64>>> {
     let volume = memory::copied("volumes", &geometry(state)?.volume)?;
     let found = state.with_rows(|rows| gradient::of(&t, &state.choices.kernel, rows, &volume, &state.pool))?;
     columns(&found, state.dim())
+}
+
+/// Multiplies vectors, given by components, by the shape of each particle's tensor.
+fn turn(state: &State, vectors: &mut [Vec<f64>]) {
+    for (i, shape) in state.directions.iter().flat_map(|d| &d.shape).enumerate() {
+        let v = std::array::from_fn(|a| vectors.get(a).map_or(0.0, |v| v[i]));
+        let turned = tensor::times(shape, v);
+        vectors.iter_mut().zip(turned).for_each(|(v, t)| v[i] = t);
+    }
 }
 
 fn times_c_v(state: &State, mut values: Vec<f64>) -> Result<Vec<f64>> {

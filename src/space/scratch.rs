@@ -20,6 +20,13 @@ impl Row<'_> {
         self.j.len()
     }
 
+    /// The unit vector towards neighbour k; zero where it is at the same place.
+    pub fn direction(&self, k: usize) -> Axes<f64> {
+        let r = self.r[k];
+        let unit = |axis: &[f64]| if r > 0.0 && !axis.is_empty() { axis[k] / r } else { 0.0 };
+        self.d.map(unit)
+    }
+
     pub fn is_empty(&self) -> bool {
         self.j.is_empty()
     }
