@@ -8,7 +8,7 @@ use super::setup::setup;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;
 use crate::kernel;
-use crate::operator::table::OPERATORS;
+use crate::operator::table::{OPERATORS, Tensor};
 use std::path::Path;
 
 /// The moments of an operator on particles.
@@ -75,7 +75,8 @@ pub fn run(mut request: Request) -> Result<Page> {
                 page.complete = false;
                 break 'all;
             }
-            for operator in OPERATORS {
+            // The weights of the others are one of these.
+            for operator in OPERATORS.iter().filter(|o| matches!(o.tensor, Tensor::Scalar)) {
                 for h_fac in &h_facs {
                     found.push(Moments::of(cloud, *n, kernel, operator.name, *h_fac)?);
                 }

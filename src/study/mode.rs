@@ -2,7 +2,8 @@
 
 use super::scene::Scene;
 use crate::error::{Error, Result};
-use crate::operator::table::OPERATORS;
+use crate::operator::Operator;
+use crate::operator::table::{OPERATORS, Tensor};
 use std::path::Path;
 
 /// How particles lie.
@@ -68,14 +69,21 @@ impl Cloud {
     }
 }
 
-/// Every isotropic operator with and without what it can be normalised by, in words, and what it is called.
+/// Operators for a scalar conductivity that differ from each other there: those that only multiply a pair's weight by an
+/// angle are the same as without.
+pub fn isotropic() -> impl Iterator<Item = &'static Operator> {
+    OPERATORS.iter().filter(|o| !matches!(o.tensor, Tensor::Angular(_)))
+}
+
+/// Each with and without what it can be normalised by: in words, and what it is called.
 pub fn variants() -> Vec<(String, String)> {
     let of = |(name, normalise): (&str, &str)| {
         (format!("operator={name} normalise={normalise}"), format!("{name} {normalise}"))
     };
-    let pairs = OPERATORS.iter().flat_map(|o| match o.normalise {
-        true => vec![(o.name, "none"), (o.name, "pair")],
-        false => vec![(o.name, "none")],
+    let pairs = isotropic().flat_map(|o| match (o.normalise, o.tensor) {
+        (true, Tensor::Scalar) => vec![(o.name, "none"), (o.name, "pair")],
+        (true, _) => vec![(o.name, "pair")],
+        (false, _) => vec![(o.name, "none")],
     });
     pairs.map(of).collect()
 }
@@ -84,7 +92,8 @@ pub fn variants() -> Vec<(String, String)> {
 pub fn refused(error: &Error) -> bool {
     matches!(
         error,
-        Error::Growth { .. }
+        Error::BadElement { .. }
+            | Error::Growth { .. }
             | Error::NotFinite { .. }
             | Error::BadValue { .. }
             | Error::StepTooLarge { .. }

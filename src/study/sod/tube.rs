@@ -78,10 +78,10 @@ impl Tube {
         self.v.iter().zip(&self.u).map(|(v, u)| self.m * (0.5 * v * v + u)).sum()
     }
 
-    /// Heun's steps to `end`.
+    /// Heun's steps to `end`, or to where numbers end: a support of hardly two neighbours does not hold a gas together.
     pub fn run(&mut self, end: f64) {
         let mut t = 0.0;
-        while t < end {
+        while t < end && self.u.iter().all(|u| u.is_finite()) {
             let dt = self.limit().min(end - t);
             self.step(dt);
             t += dt;
@@ -152,7 +152,7 @@ impl Tube {
                 self.rho[a] = sum;
                 let wanted = self.h_fac * self.m / sum;
                 let next = h + (wanted - h) / self.omega[a].max(0.2);
-                self.h[a] = next.clamp(0.5 * h, 2.0 * h);
+                self.h[a] = next.max(0.5 * h).min(2.0 * h);
                 if (self.h[a] / h - 1.0).abs() < 1e-8 {
                     break;
                 }

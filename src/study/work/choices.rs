@@ -3,8 +3,8 @@
 use crate::error::Result;
 use crate::integrator::METHODS;
 use crate::kernel::{self, Kernel};
-use crate::operator::table::OPERATORS;
 use crate::study::catalogue::Request;
+use crate::study::mode::isotropic;
 use crate::study::scene::Scene;
 use std::fmt;
 
@@ -33,7 +33,7 @@ pub fn choices(scene: &Scene, sizes: &[u32], request: &Request) -> Vec<Choice> {
     // In units of a kernel's default.
     let h_facs: &[f64] = request.pick(&[1.0], &[0.9, 1.0, 1.25], &[0.8, 0.9, 1.0, 1.125, 1.25, 1.5]);
     let mut all = Vec::new();
-    for operator in OPERATORS {
+    for operator in isotropic() {
         for &kernel in &kernels {
             let default = Kernel::new(kernel, 1).map_or(1.0, |k| k.h_fac());
             for h_fac in h_facs.iter().map(|h| (100.0 * h * default).round() / 100.0) {

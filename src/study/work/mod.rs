@@ -57,8 +57,8 @@ pub fn run(mut request: Request) -> Result<Page> {
 
 /// The work item that particle codes are compared on, in 3-D and in 2-D.
 fn built_in(request: &Request) -> Result<Vec<(String, Scene, Vec<u32>)>> {
-    let space = request.pick(vec![6, 8], vec![8, 12, 16], vec![8, 12, 16, 24, 32]);
-    let plane = request.pick(vec![8, 16], vec![16, 32, 64], vec![16, 32, 64, 128]);
+    let space = request.pick(vec![6, 8], vec![8, 12, 16, 24], vec![8, 12, 16, 24, 32, 48]);
+    let plane = request.pick(vec![8, 16], vec![16, 32, 64], vec![16, 32, 64, 128, 256]);
     let make = |(cloud, sizes): (Cloud, Vec<u32>)| {
         let mut scene = cloud.scene(16, "")?;
         scene.time.steps = 10;
