@@ -14,6 +14,9 @@ use crate::error::Result;
 use crate::operator::table::{OPERATORS, Tensor};
 use std::path::Path;
 
+/// Checks a sentence: says the answer, adds its numbers.
+type Part = fn(&mut Page, &mut Table, &Request) -> Result<()>;
+
 const COLUMNS: [&str; 5] = ["claim", "particles", "first", "second", "ratio"];
 
 /// # Errors
@@ -21,7 +24,7 @@ const COLUMNS: [&str; 5] = ["claim", "particles", "first", "second", "ratio"];
 pub fn run(mut request: Request) -> Result<Page> {
     let mut page = Page::new("claims", "Four sentences of Biriukov & Price, held against numbers");
     let mut table = Table::new("numbers", &COLUMNS.map(|name| column(name, "")));
-    let parts: [fn(&mut Page, &mut Table, &Request) -> Result<()>; 4] = [itself, anisotropic, implicit, cost];
+    let parts: [Part; 4] = [itself, anisotropic, implicit, cost];
     for (done, part) in parts.into_iter().enumerate() {
         if !request.goes_on(done, parts.len()) {
             page.complete = false;
