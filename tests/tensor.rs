@@ -144,7 +144,7 @@ fn a_gaussian_spreads_by_its_tensor() {
 fn a_step_moves_along_b_and_stands_across_it() {
     // T = 1.5 + 0.5 erf(s / sqrt(4 t)), s the distance from the step along its normal n, conducts with (n·b)².
     let x = lattice(48, 2, 0.1);
-    let t = 0.0025;
+    let t: f64 = 0.0025;
     let erf = |v: f64| {
         2.0 / PI.sqrt()
             * (0..4000).map(|k| (-((f64::from(k) + 0.5) / 4000.0 * v).powi(2)).exp() * v / 4000.0).sum::<f64>()
@@ -156,7 +156,7 @@ fn a_step_moves_along_b_and_stands_across_it() {
             set(&mut s, "T", &field(&x, 2, |p| if (0.25..0.75).contains(&p[0]) { 2.0 } else { 1.0 }));
             s.step(t).unwrap();
             let got = s.get_all("T").unwrap();
-            let width = (4.0 * share * t as f64).sqrt();
+            let width = (4.0 * share * t).sqrt();
             let exact = |p: &[f64]| {
                 if width > 0.0 { 1.5 + 0.5 * erf((p[0] - 0.25) / width) } else { f64::from(p[0] >= 0.25) + 1.0 }
             };

@@ -101,7 +101,7 @@ pub fn main() -> ExitCode {
         Ok(code) => code,
         Err(error) => {
             let message = match error {
-                Error::Cancelled => "interrupted; the snapshots listed so far are complete".to_string(),
+                Error::Cancelled => "interrupted; what was written so far is complete".to_string(),
                 _ => error.to_string(),
             };
             // Nobody is left to be told when standard error is closed too.

@@ -15,12 +15,18 @@ pub struct StudyArgs {
     /// Report as JSON
     #[arg(long)]
     json: bool,
-    /// Write NAME.txt and NAME.json into this folder as well
+    /// Write its files into this folder as well: text, JSON, and where there are any tables (CSV) and a page with plots (HTML)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// With more particles, and for as long as that takes
     #[arg(long)]
     full: bool,
+    /// With as few particles as show that it works
+    #[arg(long, hide = true, conflicts_with = "full")]
+    tiny: bool,
+    /// A scene of your own, for the study 'work-precision'
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
 }
 
 /// Runs a study and prints its answer; exit code 1 where something is not as it should be.
@@ -30,21 +36,26 @@ pub struct StudyArgs {
 pub fn run(args: &StudyArgs) -> Result<ExitCode> {
     let study = catalogue::find(&args.name)?;
     interrupt::listen();
-    let answer = (study.run)(Request { full: args.full, watch: progress::watch() })?;
+    let answer =
+        (study.run)(Request { full: args.full, tiny: args.tiny, scene: args.scene.clone(), watch: progress::watch() })?;
     let json =
         serde_json::to_string_pretty(&answer.json).map_err(|e| Error::bad("--json", e, "report this, please"))?;
     if let Some(folder) = &args.out {
         write(folder, study.name, &answer, &json)?;
     }
     print(if args.json { json + "\n" } else { answer.text })?;
+    if answer.stopped {
+        return Err(Error::Cancelled);
+    }
     Ok(if answer.failures == 0 { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn write(folder: &Path, name: &str, answer: &Answer, json: &str) -> Result<()> {
     let failed = |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
     std::fs::create_dir_all(folder).map_err(failed)?;
-    for (ending, text) in [("txt", answer.text.as_str()), ("json", json)] {
-        atomic::replace(&folder.join(name).with_extension(ending), |sink| sink.write_all(text.as_bytes()))?;
-    }
-    Ok(())
+    let own = [("txt", answer.text.as_str()), ("json", json)].map(|(ending, text)| (format!("{name}.{ending}"), text));
+    let more = answer.files.iter().map(|(file, text)| (file.clone(), text.as_str()));
+    own.into_iter()
+        .chain(more)
+        .try_for_each(|(file, text)| atomic::replace(&folder.join(file), |sink| sink.write_all(text.as_bytes())))
 }

@@ -141,7 +141,7 @@ fn solve(
         if worst <= wanted || n == 0 {
             return Ok(wanted.max(0.0));
         }
-        if linear == Linear::Frozen && !(worst < RISE * taken.before) {
+        if linear == Linear::Frozen && (worst.is_nan() || worst >= RISE * taken.before) {
             if taken.halve(pool, y, correction) {
                 continue;
             }

@@ -78,13 +78,13 @@ impl Law {
         pool.chunks(kappa, BLOCK, |start, part| {
             part.iter_mut().zip(&t[start..]).for_each(|(k, &t)| *k = self.at(t));
         });
-        if sum::first(pool, kappa.len(), |i| !(kappa[i] >= 0.0)).is_none() {
+        if sum::first(pool, kappa.len(), |i| undefined(kappa[i])).is_none() {
             return;
         }
         let (cold, lowest) = (self.at(0.0), -UNDERSHOOT * sum::max(pool, t.len(), |i| t[i].abs()));
         pool.chunks(kappa, BLOCK, |start, part| {
             let undershot =
-                part.iter_mut().zip(&t[start..]).filter(|(k, t)| !(**k >= 0.0) && (lowest..0.0).contains(*t));
+                part.iter_mut().zip(&t[start..]).filter(|(k, t)| undefined(**k) && (lowest..0.0).contains(*t));
             undershot.for_each(|(k, _)| *k = cold);
         });
     }
@@ -95,6 +95,11 @@ impl Law {
             Law::Table { t, kappa } => interpolate(t, kappa, temperature),
         }
     }
+}
+
+/// Of a conductivity that a law gives where it does not hold.
+fn undefined(kappa: f64) -> bool {
+    kappa.is_nan() || kappa < 0.0
 }
 
 fn interpolate(t: &[f64], kappa: &[f64], at: f64) -> f64 {

@@ -36,7 +36,8 @@ impl Tensor {
             let rule = "give kappa_par, kappa_perp and b, or kappa_xx, …, not both";
             return Err(Error::bad(FIELDS[first].name, "set", rule));
         }
-        if !by_components && !(set(KAPPA_PAR) && (B..B + 3).any(&set)) {
+        let by_direction = set(KAPPA_PAR) && (B..B + 3).any(&set);
+        if !(by_components || by_direction) {
             return Err(Error::bad(FIELDS[first].name, "set", "it needs kappa_par and b too"));
         }
         let mut kappa = memory::reserved("kappa", n)?;

@@ -41,10 +41,8 @@ pub fn fit(assembly: &Assembly, row: &Row, w: &mut [f64]) {
     let scale = dim as f64 / total;
     let terms = (0..row.len()).filter(|&k| turns(k)).map(|k| (prior(k) * scale, psi(row.direction(k), h / row.r[k])));
     let lambda = multipliers(&terms, &target(shape));
-    for k in 0..row.len() {
-        if row.r[k] > 0.0 {
-            w[k] *= factor(&lambda, &psi(row.direction(k), h / row.r[k]));
-        }
+    for (k, w) in w.iter_mut().enumerate().filter(|(k, _)| row.r[*k] > 0.0) {
+        *w *= factor(&lambda, &psi(row.direction(k), h / row.r[k]));
     }
 }
 

@@ -12,24 +12,53 @@
 //! | `run` | the run and its snapshots |
 //! | `report` | accuracy against run time |
 //! | `catalogue` | studies of the library itself, by name |
+//! | `kernels`, `convergence`, `work` | studies of accuracy |
+//! | `positivity` | of anisotropic operators |
+//! | `sod` | of a shock tube, with a small hydrodynamics of its own |
+//! | `claims` | of what others said |
+//! | `samples` | a computed field as a function of place |
+//! | `mode` | the scene that they share |
+//! | `page`, `table`, `plot` | what a study found, for people, browsers and programs |
 //! | `stability` | cases that break solvers |
 
 #[cfg(feature = "cli")]
 pub mod catalogue;
 #[cfg(feature = "cli")]
 mod choose;
+#[cfg(feature = "cli")]
+pub mod claims;
+#[cfg(feature = "cli")]
+pub mod convergence;
 pub mod exact;
+#[cfg(feature = "cli")]
+pub mod kernels;
 #[cfg(feature = "cli")]
 pub mod keys;
 pub mod lattice;
+#[cfg(feature = "cli")]
+mod mode;
+#[cfg(feature = "cli")]
+pub mod page;
+#[cfg(feature = "cli")]
+pub mod plot;
+#[cfg(feature = "cli")]
+pub mod positivity;
 #[cfg(feature = "cli")]
 pub mod report;
 #[cfg(feature = "cli")]
 pub mod run;
 #[cfg(feature = "cli")]
+pub mod samples;
+#[cfg(feature = "cli")]
 pub mod scene;
 #[cfg(feature = "cli")]
 mod setup;
 #[cfg(feature = "cli")]
+pub mod sod;
+#[cfg(feature = "cli")]
 pub mod stability;
 pub mod surface;
+#[cfg(feature = "cli")]
+pub mod table;
+#[cfg(feature = "cli")]
+pub mod work;

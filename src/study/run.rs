@@ -2,6 +2,7 @@
 
 use super::exact::Exact;
 use super::report::{Accuracy, Energy, LeftOut, Report, Seconds, Temperature, Work};
+pub use super::samples::Field;
 use super::scene::{Output, Scene};
 use super::setup::{at_all, setup};
 use crate::error::{Error, Result};
@@ -23,6 +24,8 @@ pub struct Study {
     scene: Scene,
     solver: Solver,
     exact: Option<Exact>,
+    /// What the exact solution is called.
+    known: String,
     setup_seconds: f64,
 }
 
@@ -34,7 +37,8 @@ impl Study {
     pub fn new(scene: Scene, folder: &Path) -> Result<Study> {
         let start = Instant::now();
         let (solver, exact) = setup(&scene, folder)?;
-        Ok(Study { scene, solver, exact, setup_seconds: start.elapsed().as_secs_f64() })
+        let known = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
+        Ok(Study { scene, solver, exact, known, setup_seconds: start.elapsed().as_secs_f64() })
     }
 
     /// What a step will do.
@@ -43,6 +47,22 @@ impl Study {
     /// As [`Solver::plan`].
     pub fn plan(&mut self) -> Result<Plan> {
         self.solver.plan()
+    }
+
+    /// The same, held against a solution that the scene does not name.
+    pub fn against(mut self, name: &str, exact: Exact) -> Study {
+        self.known = name.to_string();
+        self.exact = Some(exact);
+        self
+    }
+
+    /// Steps to the end, to what T is there as a function of place.
+    ///
+    /// # Errors
+    /// As [`Solver::step`].
+    pub fn field(mut self) -> Result<Field> {
+        self.steps(None)?;
+        Field::new(&mut self.solver)
     }
 
     /// Steps to the end, with snapshots under `out`.
@@ -58,7 +78,7 @@ impl Study {
         let work = self.steps(writer.as_mut())?;
 
         let solver = &mut self.solver;
-        let accuracy = self.exact.as_ref().map(|exact| accuracy(&self.scene, solver, exact)).transpose()?;
+        let accuracy = self.exact.as_ref().map(|exact| accuracy(&self.known, solver, exact)).transpose()?;
         let (n, neighbours) = (solver.len() as f64, solver.get_number("mean_neighbours")?);
         let seconds = Seconds {
             setup: self.setup_seconds,
@@ -136,13 +156,12 @@ fn extrema(solver: &mut Solver) -> Result<Temperature> {
 }
 
 /// The error of T where T is not fixed.
-fn accuracy(scene: &Scene, solver: &mut Solver, exact: &Exact) -> Result<Accuracy> {
+fn accuracy(solution: &str, solver: &mut Solver, exact: &Exact) -> Result<Accuracy> {
     let (dim, time) = (solver.dim(), solver.get_number("time")?);
     let known = at_all(exact, &solver.get_all("x")?, dim, time);
     let (t, fixed) = (solver.get_all("T")?, solver.get_all("fixed")?);
     let free = t.iter().zip(&known).zip(&fixed).filter(|(_, fixed)| **fixed == 0.0).map(|((t, known), _)| (*t, *known));
-    let solution = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
-    Ok(Accuracy::new(solution, &free.collect::<Vec<_>>()))
+    Ok(Accuracy::new(solution.to_string(), &free.collect::<Vec<_>>()))
 }
 
 /// Writes the series.

@@ -18,8 +18,7 @@ impl Twice {
     pub(super) fn limited(
         &self,
         pool: &Pool,
-        matrix: &Matrix,
-        kappa: Kappa,
+        (matrix, kappa): (&Matrix, Kappa),
         t: &[f64],
         exchange: impl Fn(&Exchange) -> f64 + Sync + Send,
         out: &mut [f64],

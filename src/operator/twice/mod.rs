@@ -122,7 +122,7 @@ impl Twice {
             through + self.omega(e) * jump(e, t, &g)
         };
         match &self.low {
-            Some(_) => self.limited(pool, matrix, kappa, t, exchange, out, finish),
+            Some(_) => self.limited(pool, (matrix, kappa), t, exchange, out, finish),
             None => {
                 self.each(pool, out, |a| finish(a, self.row(matrix, kappa, a).map(|e| exchange(&e)).sum()));
                 Ok(())

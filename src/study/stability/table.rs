@@ -76,7 +76,7 @@ impl Row {
 pub fn answer(rows: &[Row]) -> Result<Answer> {
     let json = serde_json::to_value(rows).map_err(|e| Error::bad("rows", e, "report this, please"))?;
     let failures = rows.iter().filter(|r| !r.verdict.is_right()).count();
-    Ok(Answer { text: text(rows), json, failures })
+    Ok(Answer { text: text(rows), json, failures, ..Answer::default() })
 }
 
 fn text(rows: &[Row]) -> String {
