@@ -19,6 +19,7 @@ fn main() {
     // Without `--bench` cargo only checks that benchmarks start.
     if std::env::args().any(|a| a == "--bench") {
         table(if full { &[22, 50, 100, 159] } else { &[22, 50] });
+        stiff(30);
     }
 }
 
@@ -41,8 +42,12 @@ fn positions(n: usize) -> Vec<f64> {
 
 impl Item {
     fn new(n: usize, threads: usize) -> Item {
+        Item::with(n, &format!("integrator=euler threads={threads}"))
+    }
+
+    fn with(n: usize, words: &str) -> Item {
         let (x, count) = (positions(n), n * n * n);
-        let words = format!("heat dim=3 kernel=M4 h_fac=1.3 integrator=euler threads={threads}");
+        let words = format!("heat dim=3 kernel=M4 h_fac=1.3 {words}");
         let mut solver = Solver::new(&words).unwrap();
         solver.set_box(&[0.0; 3], &[1.0; 3], &[true; 3]).unwrap();
         solver.set_particles(Strided::new("x", &x, count, 3, 3).unwrap()).unwrap();
@@ -161,6 +166,31 @@ fn table(sizes: &[usize]) {
                 100.0 * bytes / median(bandwidth)
             );
         }
+    }
+}
+
+/// One step of R explicit limits by RKL2, as far as stability allows, beside Euler's sub-steps: the gain of s stages over
+/// R ~ s²/4 sub-steps is about sqrt(R)/2.
+fn stiff(n: usize) {
+    println!("\n         R  euler applications     ms  rkl2 applications     ms   gain  sqrt(R)/2");
+    for r in [10.0, 100.0, 1000.0, 10000.0] {
+        let step = |words: &str| {
+            let mut solver = Item::with(n, words).solver;
+            let dt = r * solver.limit().unwrap();
+            let start = Instant::now();
+            let report = solver.step(dt).unwrap();
+            (report.applications, start.elapsed().as_secs_f64() * 1e3)
+        };
+        let (euler, rkl2) = (step("threads=1 integrator=euler bounds=free"), step("threads=1 integrator=rkl2 change=inf max_stages=999"));
+        println!(
+            "{r:10} {:19} {:6.0} {:18} {:6.0} {:6.1} {:10.1}",
+            euler.0,
+            euler.1,
+            rkl2.0,
+            rkl2.1,
+            euler.1 / rkl2.1,
+            r.sqrt() / 2.0
+        );
     }
 }
 
