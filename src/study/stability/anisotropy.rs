@@ -67,8 +67,7 @@ pub const CASES: &[Case] = &[
         required: "10 <= T <= 12, energy to 1e-12",
         source: "Sharma & Hammett 2007",
         trials: || {
-            [vec![Trial::fail("operator=two-first", TWO_FIRST)], vec![pass("monotone"), pass("limited")]]
-                .concat()
+            [vec![Trial::fail("operator=two-first", TWO_FIRST)], vec![pass("monotone"), pass("limited")]].concat()
         },
         check: ring,
     },
