@@ -181,7 +181,10 @@ fn stiff(n: usize) {
             let report = solver.step(dt).unwrap();
             (report.applications, start.elapsed().as_secs_f64() * 1e3)
         };
-        let (euler, rkl2) = (step("threads=1 integrator=euler bounds=free"), step("threads=1 integrator=rkl2 change=inf max_stages=999"));
+        let (euler, rkl2) = (
+            step("threads=1 integrator=euler bounds=free"),
+            step("threads=1 integrator=rkl2 change=inf max_stages=999"),
+        );
         println!(
             "{r:10} {:19} {:6.0} {:18} {:6.0} {:6.1} {:10.1}",
             euler.0,
