@@ -86,7 +86,7 @@ fn moments_and_sweet_spots_are_the_known_ones() {
         let mut own = own.filter(|r| (number(r, "h_fac") - h_fac).abs() < 1e-9);
         number(own.next().unwrap(), "K_d2 - 1")
     };
-    // NUMERICS 1.6, derived with another program.
+    // Derived with another program.
     for (kernel, operator, h_fac, known) in [
         ("M4", "brookshaw", 1.0, -3.4e-2),
         ("M4", "kernel", 1.0, -1.3e-3),

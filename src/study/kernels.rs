@@ -192,7 +192,7 @@ fn say(page: &mut Page, found: &[Moments]) {
 mod tests {
     use super::*;
 
-    /// K_d2 − 1 on fcc, derived independently for NUMERICS: brookshaw, kernel, direct, and neighbours.
+    /// K_d2 − 1 on fcc, derived independently: brookshaw, kernel, direct, and neighbours.
     #[test]
     fn moments_on_fcc_are_those_derived_elsewhere() {
         for (kernel, h_fac, expected, neighbours) in [
