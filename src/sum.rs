@@ -39,14 +39,7 @@ pub fn spread(
     weight: impl Fn(usize) -> f64 + Sync + Send,
     value: impl Fn(usize) -> f64 + Sync + Send,
 ) -> f64 {
-    let largest = max(pool, n, |i| value(i).abs());
-    if !largest.is_finite() || largest == 0.0 {
-        return largest.max(0.0);
-    }
-    let total = sum(pool, n, &weight);
-    let mean = sum(pool, n, |i| weight(i) / total * (value(i) / largest));
-    let deviation = |i: usize| value(i) / largest - mean;
-    largest * sum(pool, n, |i| weight(i) / total * deviation(i) * deviation(i)).sqrt()
+    deviation(pool, n, weight, value, true)
 }
 
 /// The weighted root mean square of `value`, scaled likewise.
@@ -56,12 +49,26 @@ pub fn rms(
     weight: impl Fn(usize) -> f64 + Sync + Send,
     value: impl Fn(usize) -> f64 + Sync + Send,
 ) -> f64 {
+    deviation(pool, n, weight, value, false)
+}
+
+/// Root mean square about the mean, or about 0.
+fn deviation(
+    pool: &Pool,
+    n: usize,
+    weight: impl Fn(usize) -> f64 + Sync + Send,
+    value: impl Fn(usize) -> f64 + Sync + Send,
+    about_mean: bool,
+) -> f64 {
     let largest = max(pool, n, |i| value(i).abs());
     if !largest.is_finite() || largest == 0.0 {
         return largest.max(0.0);
     }
     let total = sum(pool, n, &weight);
-    largest * sum(pool, n, |i| weight(i) / total * (value(i) / largest).powi(2)).sqrt()
+    let scaled = |i: usize| value(i) / largest;
+    let centre = if about_mean { sum(pool, n, |i| weight(i) / total * scaled(i)) } else { 0.0 };
+    let from_centre = |i: usize| scaled(i) - centre;
+    largest * sum(pool, n, |i| weight(i) / total * from_centre(i) * from_centre(i)).sqrt()
 }
 
 /// The first index for which `test` holds.

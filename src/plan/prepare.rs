@@ -57,7 +57,6 @@ impl State {
         if !self.kappa_of_t() && !self.has_tensor() {
             self.need(fields::KAPPA, call)?;
         }
-        self.prepare_directions(call)?;
         let plan = self.plan()?;
         self.prepare_capacity()?;
         self.prepare_surface(&plan)?;
@@ -172,18 +171,19 @@ impl State {
 
     /// An input as an array; a number is repeated.
     pub fn each(&self, slot: Slot) -> Result<Vec<f64>> {
-        match self.inputs[slot].view(self.len())? {
-            Cow::Borrowed(v) => memory::copied(FIELDS[slot].name, v),
+        self.repeated(FIELDS[slot].name, &self.inputs[slot])
+    }
+
+    fn repeated(&self, what: &str, input: &Input) -> Result<Vec<f64>> {
+        match input.view(self.len())? {
+            Cow::Borrowed(v) => memory::copied(what, v),
             Cow::Owned(v) => Ok(v),
         }
     }
 
     /// kappa as an array; a number is repeated.
     fn each_kappa(&self) -> Result<Vec<f64>> {
-        match self.kappa().view(self.len())? {
-            Cow::Borrowed(v) => memory::copied("kappa", v),
-            Cow::Owned(v) => Ok(v),
-        }
+        self.repeated("kappa", self.kappa())
     }
 
     /// Calls `work` with the rows of neighbours. Needs the geometry.
@@ -198,7 +198,7 @@ impl State {
         let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
         let (operator, kernel, order) = (self.choices.operator, &self.choices.kernel, self.choices.order);
         let units = self.unit_shape()?;
-        let shape = self.shape(&units);
+        let shape = shape_of(&self.directions, &units);
         self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h, order, shape }))
     }
 
@@ -206,11 +206,6 @@ impl State {
     fn unit_shape(&self) -> Result<Vec<Sym>> {
         let wanted = self.choices.without("isotropic");
         memory::filled("shapes", if wanted { self.len() } else { 0 }, tensor::unit(self.dim()))
-    }
-
-    fn shape<'a>(&'a self, units: &'a [Sym]) -> Option<&'a [Sym]> {
-        let own = self.directions.as_ref().map_or(&[][..], |d| &d.shape);
-        [own, units].into_iter().find(|s| !s.is_empty())
     }
 
     /// The conductivity of each particle at its temperature, the mean over directions.
@@ -388,8 +383,7 @@ impl State {
                 let (operator, kernel, same_h) =
                     (self.choices.operator, &self.choices.kernel, plan.leaves_out("same_h"));
                 let order = self.choices.order;
-                let own = self.directions.as_ref().map_or(&[][..], |d| &d.shape);
-                let shape = [own, &units].into_iter().find(|s| !s.is_empty());
+                let shape = shape_of(&self.directions, &units);
                 assembly = Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h, order, shape };
                 Pairs::Fresh(&assembly)
             }
@@ -423,6 +417,12 @@ impl State {
         self.applications += motion.heat.applications;
         result
     }
+}
+
+/// The shapes of particles that are not isotropic, or those that are to be used all the same.
+fn shape_of<'a>(directions: &'a Option<Directions>, units: &'a [Sym]) -> Option<&'a [Sym]> {
+    let own = directions.as_ref().map_or(&[][..], |d| &d.shape);
+    [own, units].into_iter().find(|s| !s.is_empty())
 }
 
 /// Whether the cloud's cells suit a search that reaches this far: not much more than a cell, and not much less.
