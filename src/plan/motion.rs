@@ -21,8 +21,15 @@ pub struct Motion<'a> {
     pub work: &'a mut Work,
     pub progress: &'a mut Option<Progress>,
     pub timers: &'a mut Timers,
-    /// Refined bounds that still hold.
-    pub known: &'a mut Option<Bounds>,
+    /// What was found out about the operator as it still is.
+    pub known: &'a mut Option<Known>,
+}
+
+/// Bounds on an operator, and whether power iteration has lowered them.
+#[derive(Debug, Clone, Copy)]
+pub struct Known {
+    pub bounds: Bounds,
+    refined: bool,
 }
 
 impl System for Heat<'_> {
@@ -100,7 +107,7 @@ impl Motion<'_> {
             return Ok(());
         }
         let start = Instant::now();
-        report.limit = explicit_limit(self.known_or_proven(time, t)?);
+        report.limit = explicit_limit(self.known_or_proven(time, t)?.bounds);
         method.advance(&schedule, &mut self.heat, self.pool, time, t, self.work)?;
         self.timers.add("solve", start.elapsed());
         (report.substeps, report.stages) = (1, schedule.stages.into());
@@ -114,7 +121,8 @@ impl Motion<'_> {
         // No tolerance makes a step possible that is too long for stability alone.
         let bounds = self.stability(time, dt, t)?;
         let mut schedule = method.schedule(dt, bounds, options)?;
-        report.limit = explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)? } else { bounds });
+        report.limit =
+            explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.bounds } else { bounds });
         let control = Control { method, tolerance };
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
         let mut done = 0.0;
@@ -188,16 +196,22 @@ impl Motion<'_> {
 
     /// Bounds that are good enough for a step of `dt`.
     pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
-        if let Some(bounds) = self.known.filter(|_| self.heat.operator_is_fixed()) {
-            return Ok(bounds);
-        }
         let start = Instant::now();
-        let mut bounds = self.proven_bounds(time, t)?;
-        if !(self.plan.leaves_out("proven_bound") && self.is_least_work(dt, bounds)) {
-            bounds = self.refine(bounds, t)?;
-            *self.known = Some(bounds).filter(|_| self.heat.operator_is_fixed());
-        }
+        let known = self.known_or_proven(time, t)?;
+        let enough = self.plan.leaves_out("proven_bound") && self.is_least_work(dt, known.bounds);
+        let bounds = if enough { known.bounds } else { self.refined_bounds(time, t)? };
         self.timers.add("bound", start.elapsed());
+        Ok(bounds)
+    }
+
+    /// The best bounds there are: Gershgorin's, lowered by power iteration.
+    pub fn refined_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+        let known = self.known_or_proven(time, t)?;
+        if known.refined {
+            return Ok(known.bounds);
+        }
+        let bounds = self.refine(known.bounds, t)?;
+        self.remember(Known { bounds, refined: true });
         Ok(bounds)
     }
 
@@ -211,13 +225,22 @@ impl Motion<'_> {
     }
 
     /// The best bounds that cost no more than one application: for a report, or a choice between methods.
-    pub fn known_or_proven(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
-        let known = self.known.filter(|_| self.heat.operator_is_fixed());
-        known.map_or_else(|| self.proven_bounds(time, t), Ok)
+    pub fn known_or_proven(&mut self, time: f64, t: &[f64]) -> Result<Known> {
+        if let Some(known) = self.known.filter(|_| self.heat.operator_is_fixed()) {
+            return Ok(known);
+        }
+        let known = Known { bounds: self.proven_bounds(time, t)?, refined: false };
+        self.remember(known);
+        Ok(known)
+    }
+
+    /// Keeps bounds for later steps, if they will hold then.
+    fn remember(&mut self, known: Known) {
+        *self.known = Some(known).filter(|_| self.heat.operator_is_fixed());
     }
 
     /// Gershgorin's bounds: proven, for any operator and any kappa.
-    pub fn proven_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+    fn proven_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
         let circles = self.heat.circles(time, t)?;
         let largest = |of: fn(&(f64, f64)) -> f64| sum::max(self.pool, circles.len(), |i| of(&circles[i])).max(0.0);
         let bounds = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
@@ -228,7 +251,7 @@ impl Motion<'_> {
     }
 
     /// The same, lowered by power iteration. Exchange with the surroundings is linearised.
-    pub fn refine(&mut self, proven: Bounds, t: &[f64]) -> Result<Bounds> {
+    fn refine(&mut self, proven: Bounds, t: &[f64]) -> Result<Bounds> {
         if proven.spectral == 0.0 {
             return Ok(proven);
         }

@@ -88,10 +88,7 @@ impl State {
         self.cancel.store(false, Ordering::Relaxed);
         let plan = self.prepare("limit")?;
         let (t, time) = (self.each(fields::T)?, self.time);
-        self.with_motion(&plan, |motion| {
-            let proven = motion.proven_bounds(time, &t)?;
-            motion.refine(proven, &t)
-        })
+        self.with_motion(&plan, |motion| motion.refined_bounds(time, &t))
     }
 
     /// The largest stable explicit Euler step now; infinite where nothing diffuses.

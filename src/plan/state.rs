@@ -1,11 +1,12 @@
 //! Everything that a solver holds: what the host handed over, and what was derived from it, each derived thing present
 //! or absent. A setter drops what it invalidates; `prepare` makes what is missing.
 
+use super::motion::Known;
 use super::report::Timers;
 use super::{Choices, Facts};
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::integrator::{Bounds, Work};
+use crate::integrator::Work;
 use crate::memory;
 use crate::model::conductivity::Law;
 use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
@@ -119,7 +120,7 @@ pub struct State {
     pub weights: Option<Weights>,
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
-    pub bounds: Option<Bounds>,
+    pub bounds: Option<Known>,
 
     /// Steps taken and rates asked for, and whether particles or kappa changed after the first.
     pub steps: u64,
