@@ -41,6 +41,7 @@ const SCENES: &[Scene] = &[
     Scene { rule: "proven_bound", words: "kernel=M4 integrator=euler", set: nothing, steps: &[0.1, 0.1] },
     Scene { rule: "rate_only", words: "kernel=M4", set: nothing, steps: RATES },
     Scene { rule: "used_once", words: "kernel=C2 normalise=none", set: kappa_by_place, steps: RATES },
+    Scene { rule: "decays", words: "kernel=M4", set: nothing, steps: &[5.0] },
     Scene { rule: "positive", words: "kernel=M4", set: nothing, steps: &[5.0] },
 ];
 

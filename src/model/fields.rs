@@ -99,6 +99,11 @@ pub static FIELDS: &[Field] = &[
     output("K_d2", "-", "second moment of the operator (1 for a perfect Laplacian)"),
     vector(output("first_moment", "-", "h times the first moment of the operator (0 for a perfect Laplacian)")),
     output("neighbours", "-", "number of neighbours"),
+    output(
+        "order_reached",
+        "-",
+        "order of the consistent weights (0: others), lowered where neighbours are too few or on one side",
+    ),
     output("omega", "-", "grad-h factor"),
     vector(output("grad_T", "K/m", "temperature gradient, exact for linear fields")),
     vector(output("flux", "W/m^2", "heat flux -kappa grad T")),
@@ -176,6 +181,8 @@ pub static NUMBERS: &[Number] = &[
     result("negative_pairs", "-", "pairs with a negative weight, both directions counted"),
     result("K_d2_min", "-", "smallest second moment of the operator"),
     result("K_d2_max", "-", "largest second moment of the operator"),
+    result("growth_rate", "1/s", "largest real part in the operator's spectrum (Arnoldi): above 0 where a mode grows"),
+    result("lowered_orders", "-", "particles whose consistent weights have a lower order than was asked for"),
     result("bytes", "bytes", "memory held for particles and weights"),
     result("threads", "-", "worker threads"),
 ];

@@ -13,7 +13,8 @@
 //! Where the conductivity is a tensor kappa S (tr S = nu), an operator either turns S into weights of pairs ([`once`]) or
 //! takes a gradient, a flux and a divergence ([`twice`]).
 
-mod consistent;
+pub mod arnoldi;
+pub mod consistent;
 pub mod gradient;
 pub mod matrix;
 pub mod mean;

@@ -27,6 +27,8 @@ pub struct Assembly<'a> {
     pub same_h: bool,
     /// Of polynomials that consistent weights are exact for: 2, 4 or 6.
     pub order: u32,
+    /// Take consistent weights as they come, with modes that grow.
+    pub any_row: bool,
     /// How each particle conducts by direction, trace nu; none where all are isotropic.
     pub shape: Option<&'a [Sym]>,
 }
@@ -38,6 +40,8 @@ pub struct Buffers {
     w: Vec<f64>,
     other: Vec<f64>,
     spare: Vec<f64>,
+    /// That the last row's consistent weights reached.
+    pub order: u32,
 }
 
 impl Assembly<'_> {
@@ -45,7 +49,7 @@ impl Assembly<'_> {
     pub fn weights<'b>(&self, row: &Row, buffers: &'b mut Buffers) -> Result<&'b [f64]> {
         let n = row.len();
         buffers.reserve(n)?;
-        let Buffers { q, w, other, spare } = buffers;
+        let Buffers { q, w, other, spare, order } = buffers;
         let (q, w, other, spare) = (&mut q[..n], &mut w[..n], &mut other[..n], &mut spare[..n]);
         let power = self.kernel.dim() as i32 + 2;
         let h = self.rows.h;
@@ -55,7 +59,7 @@ impl Assembly<'_> {
         let scale = own.powi(power);
         w.iter_mut().for_each(|w| *w *= scale);
         if matches!(self.operator.tensor, Tensor::Consistent) {
-            consistent::fit(self, row, w);
+            *order = consistent::fit(self, row, w, spare);
             return Ok(w);
         }
         if !self.same_h {

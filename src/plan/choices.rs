@@ -25,7 +25,10 @@ pub static WORDS: &[(&str, &str)] = &[
         "gradient",
         "of two-first and limited: corrected, exact for linear fields; plain, as in the paper, with 1/(Omega rho) (default corrected)",
     ),
-    ("allow", "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow"),
+    (
+        "allow",
+        "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent without a check of its spectrum",
+    ),
     ("normalise", "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own)"),
     (
         "mean",

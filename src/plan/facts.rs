@@ -31,6 +31,8 @@ pub struct Facts {
     pub twice: bool,
     /// Weights of pairs are fitted particle by particle.
     pub fitted: bool,
+    /// Weights differ from the two sides of a pair, and modes that grow are refused.
+    pub one_sided: bool,
     /// The operator has no negative weight.
     pub positive: bool,
     /// The integrator promises the maximum principle, and nothing heats.

@@ -110,6 +110,9 @@ impl Plan {
             let about = "Gershgorin's circles; power iteration where it saves stages";
             add("bound", bound_when, 0.0, pairs, about.into());
         }
+        if !self.leaves_out("decays") && !facts.kappa_of_t {
+            add("spectrum", setup, 320.0 * n, 40.0 * pairs, "Arnoldi's method: refused where a mode grows".into());
+        }
         if facts.kappa_of_t {
             add("kappa", When::EachStage, 8.0 * n, 0.0, "kappa(T)".into());
         }

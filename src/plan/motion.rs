@@ -7,10 +7,14 @@ use crate::error::{Error, Result};
 use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Schedule, System, Work};
 use crate::memory;
 use crate::model::heat::{self, Heat};
-use crate::operator::spectrum;
+use crate::operator::{arnoldi, spectrum};
 use crate::pool::Pool;
 use crate::sum;
 use std::time::Instant;
+
+/// Growth, in units of the fastest rate, above which a mode is taken for real: Ritz values of operators that are not
+/// symmetric scatter by less.
+const GROWS: f64 = 1e-3;
 
 /// A prepared right-hand side and what it takes to move it.
 pub struct Motion<'a> {
@@ -230,8 +234,37 @@ impl Motion<'_> {
             return Ok(known);
         }
         let known = Known { bounds: self.proven_bounds(time, t)?, refined: false };
+        if !self.plan.leaves_out("decays") && self.heat.operator_is_fixed() {
+            self.refuse_growing_modes(t)?;
+        }
         self.remember(known);
         Ok(known)
+    }
+
+    /// The fastest growth of a mode of the operator, and its largest rate, 1/s.
+    pub fn growth(&mut self, t: &[f64]) -> Result<(f64, f64)> {
+        let (heat, pool) = (&mut self.heat, self.pool);
+        let weight = memory::collected("capacities", heat.inverse_capacity.iter().map(|&i| heat::capacity(i)))?;
+        heat.linearise_surface(t)?;
+        arnoldi::rightmost(pool, &weight, |x, y| heat.linear(x, y))
+    }
+
+    /// An operator whose modes grow is of no use, however small the step.
+    fn refuse_growing_modes(&mut self, t: &[f64]) -> Result<()> {
+        let start = Instant::now();
+        let (growth, fastest) = self.growth(t)?;
+        self.timers.add("spectrum", start.elapsed());
+        if growth <= GROWS * fastest {
+            return Ok(());
+        }
+        let operator = self.choices.operator.name;
+        let rule = format!(
+            "on these particles its weights have a mode that grows at {growth:.1e} /s, {:.1} % of the fastest decay: give \
+             more neighbours by a larger h_fac, a lower order or a smoother kappa, use operator=brookshaw, or insist with \
+             allow=unstable",
+            100.0 * growth / fastest
+        );
+        Err(Error::bad("operator", operator, &rule))
     }
 
     /// Keeps bounds for later steps, if they will hold then.

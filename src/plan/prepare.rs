@@ -198,8 +198,8 @@ impl State {
         let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
         let (operator, kernel, order) = (self.choices.operator, &self.choices.kernel, self.choices.order);
         let units = self.unit_shape()?;
-        let shape = shape_of(&self.directions, &units);
-        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h, order, shape }))
+        let (shape, any_row) = (shape_of(&self.directions, &units), self.choices.allow_unstable);
+        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h, order, any_row, shape }))
     }
 
     /// Shapes of isotropic particles, where `without=isotropic` asks for them; else empty.
@@ -384,7 +384,8 @@ impl State {
                     (self.choices.operator, &self.choices.kernel, plan.leaves_out("same_h"));
                 let order = self.choices.order;
                 let shape = shape_of(&self.directions, &units);
-                assembly = Assembly { operator, kernel, rows: &rows, volume: &g.volume, same_h, order, shape };
+                let (volume, any_row) = (&g.volume, self.choices.allow_unstable);
+                assembly = Assembly { operator, kernel, rows: &rows, volume, same_h, order, any_row, shape };
                 Pairs::Fresh(&assembly)
             }
         };

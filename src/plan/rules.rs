@@ -100,6 +100,12 @@ pub static RULES: &[Rule] = &[
         holds: |f| f.rate_only && f.moves && !f.normalised && !f.twice && !f.fitted,
     },
     Rule {
+        name: "decays",
+        reason: "weights are the same from both sides of a pair, or growth was allowed: no check of the spectrum",
+        same: Same::Bits,
+        holds: |f| !f.one_sided,
+    },
+    Rule {
         name: "positive",
         reason: "no pair weight is negative, so T cannot grow: no check of its norm",
         same: Same::Bits,

@@ -91,6 +91,16 @@ impl State {
         self.with_motion(&plan, |motion| motion.refined_bounds(time, &t))
     }
 
+    /// The largest real part in the spectrum of the operator now, 1/s.
+    pub fn growth(&mut self, t: &[f64]) -> Result<f64> {
+        let plan = self.prepare("growth_rate")?;
+        let time = self.time;
+        self.with_motion(&plan, |motion| {
+            motion.heat.kappa_of_t(time, t)?;
+            Ok(motion.growth(t)?.0)
+        })
+    }
+
     /// The largest stable explicit Euler step now; infinite where nothing diffuses.
     pub fn limit(&mut self) -> Result<f64> {
         Ok(explicit_limit(self.bounds()?))

@@ -395,6 +395,7 @@ impl State {
             normalised: choices.normalise,
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
             twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
+            one_sided: matches!(choices.operator.tensor, Tensor::Consistent) && !choices.allow_unstable,
             fitted: matches!(choices.operator.tensor, Tensor::Stencils),
             positive,
             keeps_bounds: positive && strong_stability && !heated && exchanging == 0,

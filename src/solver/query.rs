@@ -5,7 +5,8 @@ use crate::array::StridedMut;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Field, Slot};
-use crate::operator::{gradient, moments, tensor};
+use crate::operator::table::Tensor;
+use crate::operator::{consistent, gradient, moments, tensor};
 use crate::plan::state::{Input, State, Weights};
 use crate::space::density;
 
@@ -77,6 +78,15 @@ impl Solver {
             }
             "K_d2_min" => moments(state, f64::min, f64::INFINITY)?,
             "K_d2_max" => moments(state, f64::max, f64::NEG_INFINITY)?,
+            "growth_rate" => {
+                let t = temperatures(state)?;
+                state.growth(&t)?
+            }
+            "lowered_orders" => {
+                let consistent = matches!(state.choices.operator.tensor, Tensor::Consistent);
+                let asked = if consistent { state.choices.order.into() } else { 0.0 };
+                orders(state)?.into_iter().filter(|&order| order < asked).count() as f64
+            }
             "bytes" => state.bytes() as f64,
             _ => state.pool.threads() as f64,
         })
@@ -122,6 +132,7 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
             let matrix = &prepared(state)?.matrix;
             memory::collected("neighbours", (0..n).map(|i| matrix.neighbours(i) as f64))?
         }
+        "order_reached" => orders(state)?,
         "omega" => {
             let m = given(state, fields::M)?;
             geometry(state)?;
@@ -149,6 +160,12 @@ fn geometry(state: &mut State) -> Result<&crate::plan::state::Geometry> {
 fn prepared(state: &mut State) -> Result<&Weights> {
     state.prepare("get")?;
     state.weights.as_ref().ok_or(Error::OutOfOrder { call: "get".into(), missing: "set_particles".into() })
+}
+
+/// The order of each particle's consistent weights; 0 where others are used.
+fn orders(state: &mut State) -> Result<Vec<f64>> {
+    let same_h = geometry(state)?.same_h;
+    state.with_assembly(same_h, |a| consistent::reached(a, &state.pool))
 }
 
 fn gradient_of_t(state: &mut State) -> Result<Vec<Vec<f64>>> {
