@@ -53,14 +53,23 @@ pub fn rightmost(
         length = dot(&next, &next).sqrt();
         largest = largest.max(length);
     }
-    let m = basis.len();
-    let Some(schur) = Schur::try_new(hessenberg.view((0, 0), (m, m)).into_owned(), f64::EPSILON, 100 * APPLICATIONS)
-    else {
-        return Ok((f64::INFINITY, f64::INFINITY));
+    extremes(hessenberg.view((0, 0), (basis.len(), basis.len())).into_owned())
+}
+
+/// The largest real part and the largest modulus among the eigenvalues of a matrix.
+fn extremes(matrix: DMatrix<f64>) -> Result<(f64, f64)> {
+    match matrix.nrows() {
+        0 => return Ok((0.0, 0.0)),
+        // Schur's form wants two.
+        1 => return Ok((matrix[(0, 0)], matrix[(0, 0)].abs())),
+        _ => {}
+    }
+    let Some(schur) = Schur::try_new(matrix, f64::EPSILON, 100 * APPLICATIONS) else {
+        return Err(Error::NotFinite { what: "the spectrum of the operator".into(), index: 0, value: f64::NAN });
     };
     let values = schur.complex_eigenvalues();
     let fold = |of: fn(f64, f64) -> f64, start| values.iter().map(|v| of(v.re, v.im)).fold(start, f64::max);
-    Ok(if m == 0 { (0.0, 0.0) } else { (fold(|re, _| re, f64::NEG_INFINITY), fold(f64::hypot, 0.0)) })
+    Ok((fold(|re, _| re, f64::NEG_INFINITY), fold(f64::hypot, 0.0)))
 }
 
 /// A start vector with something of every mode, the same on every machine.

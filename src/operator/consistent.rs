@@ -241,9 +241,9 @@ fn normal<const D: usize, const M: usize, const N: usize>(
 ) -> SMatrix<f64, M, M> {
     // Where the moments with x^i y^j begin.
     let (mut first, mut m) = ([[0; 13]; 13], 0);
-    for i in 0..=2 * order {
-        for j in 0..=if D > 1 { 2 * order - i } else { 0 } {
-            first[i][j] = m;
+    for (i, first) in first.iter_mut().enumerate().take(2 * order + 1) {
+        for (j, first) in first.iter_mut().enumerate().take(if D > 1 { 2 * order - i + 1 } else { 1 }) {
+            *first = m;
             m += if D > 2 { 2 * order - i - j + 1 } else { 1 };
         }
     }
