@@ -42,7 +42,7 @@
 #include <stdint.h>
 
 /* The start of every report. */
-#define DIFFUSPH_REPORT_INIT {(int64_t)sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
+#define DIFFUSPH_REPORT_INIT {(int64_t)sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
 
 /**
  * Done.
@@ -269,6 +269,10 @@ typedef struct diffusph_report {
    * Sub-steps that were done again, shorter, for the tolerance.
    */
   int64_t rejected;
+  /**
+   * Iterations of conjugate gradients, of implicit integrators.
+   */
+  int64_t iterations;
 } diffusph_report;
 
 #ifdef __cplusplus

@@ -172,7 +172,7 @@ fn stiffness_costs_iterations_until_heat_has_crossed_the_box() {
     let x = lattice(16, 3, 0.2);
     let mut last = 0;
     for stiffness in [1.0, 1e1, 1e2, 1e3, 1e4, 1e5, 1e6] {
-        let words = "kernel=M4 integrator=backward-euler solver_tolerance=1e-8";
+        let words = "kernel=M4 integrator=backward-euler solver_tolerance=1e-8 preconditioner=jacobi";
         let mut s = unit_box(words, &x, 3, true);
         set(&mut s, "T", &field(&x, 3, |p| if p.iter().all(|c| (c - 0.5).abs() < 0.25) { 10.0 } else { 0.1 }));
         let limit = s.limit().unwrap();
@@ -187,7 +187,7 @@ fn stiffness_costs_iterations_until_heat_has_crossed_the_box() {
 #[test]
 fn an_unsolved_step_changes_nothing() {
     for method in METHODS {
-        let mut s = disc(&format!("integrator={method} max_iterations=12"));
+        let mut s = disc(&format!("integrator={method} max_iterations=12 preconditioner=jacobi"));
         let before = bits(&s.get_all("T").unwrap());
         let limit = s.limit().unwrap();
         let e = s.step(1e4 * limit).unwrap_err();

@@ -39,6 +39,7 @@ const SCENES: &[Scene] = &[
     Scene { rule: "quiet_rows", words: "kernel=M4 integrator=ssprk3", set: hot_corner, steps: &[2.0, 3.0] },
     Scene { rule: "one_stage", words: "kernel=M4 integrator=rkl1", set: nothing, steps: &[0.01] },
     Scene { rule: "proven_bound", words: "kernel=M4 integrator=euler", set: nothing, steps: &[0.1, 0.1] },
+    Scene { rule: "keep_matrix", words: "integrator=sdirk2 kernel=M4", set: hot_corner, steps: &[90.0, 90.0, 200.0] },
     Scene { rule: "rate_only", words: "kernel=M4", set: nothing, steps: RATES },
     Scene { rule: "used_once", words: "kernel=C2 normalise=none", set: kappa_by_place, steps: RATES },
     Scene { rule: "positive", words: "kernel=M4", set: nothing, steps: &[5.0] },

@@ -35,6 +35,8 @@ pub struct Report {
     pub seconds: f64,
     /// Sub-steps that were done again, shorter, for the tolerance.
     pub rejected: i64,
+    /// Iterations of conjugate gradients, of implicit integrators.
+    pub iterations: i64,
 }
 
 impl From<plan::Report> for Report {
@@ -54,6 +56,7 @@ impl From<plan::Report> for Report {
             energy: r.energy,
             seconds: r.seconds,
             rejected: count(r.rejected),
+            iterations: count(r.iterations),
         }
     }
 }

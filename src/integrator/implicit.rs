@@ -7,7 +7,7 @@
 //! what is left lies between two iterates, and so within their bounds.
 
 use super::krylov::{Equations, Limits, add, unsolved};
-use super::{Linear, Schedule, System, Work};
+use super::{Linear, Schedule, Shifted, System, Work};
 use crate::error::{Error, Result};
 use crate::pool::{BLOCK, Pool};
 use crate::sum;
@@ -69,7 +69,7 @@ impl Tableau {
         let dt = schedule.dt;
         let [base, stage, first, second, space @ ..] = work.arrays::<10>(y.len())?;
         let rates = [first, second];
-        let (mut supplies, mut slack) = ([Some(0.0); 2], 0.0);
+        let (mut supplies, mut slack, mut iterations) = ([Some(0.0); 2], 0.0, 0);
         stage.copy_from_slice(y);
         for (i, (a, c)) in self.a.iter().zip(self.c).enumerate() {
             let (time, g) = (t + c * dt, a[i] * dt);
@@ -81,7 +81,8 @@ impl Tableau {
             }
             base.copy_from_slice(y);
             (0..i).for_each(|j| add(pool, base, dt * a[j], rates[j]));
-            slack = solve(system, pool, schedule.limits, (time, g), base, stage, space)?;
+            let (allowed, spent) = solve(system, pool, schedule.limits, (time, g), base, stage, space)?;
+            (slack, iterations) = (allowed, iterations + spent);
             supplies[i] = system.supply(time, stage)?;
             let supplied = (0..=i).map(|j| Some(dt * a[j] * supplies[j]?)).sum::<Option<f64>>();
             if let Some(supplied) = supplied {
@@ -94,12 +95,13 @@ impl Tableau {
         }
         y.copy_from_slice(stage);
         work.slack = slack;
+        work.iterations += iterations;
         Ok(())
     }
 }
 
-/// Solves Y = base + g rate(t, Y), starting from the Y given. Returns the largest residual that was allowed; for a
-/// matrix whose inverse is positive it bounds the error too.
+/// Solves Y = base + g rate(t, Y), starting from the Y given. Returns the largest residual that was allowed (for a
+/// matrix whose inverse is positive it bounds the error too), and the number of iterations.
 fn solve(
     system: &mut dyn System,
     pool: &Pool,
@@ -108,7 +110,7 @@ fn solve(
     base: &[f64],
     y: &mut [f64],
     [diagonal, weight, residual, correction, p, q]: &mut Space,
-) -> Result<f64> {
+) -> Result<(f64, u64)> {
     let n = y.len();
     let (mut spent, mut size, mut change) = (0, 0.0, None);
     let (mut worst, mut wanted) = (f64::INFINITY, 0.0);
@@ -139,7 +141,7 @@ fn solve(
         wanted = limits.tolerance * change + rounding * size;
         worst = sum::max(pool, n, |i| residual[i].abs());
         if worst <= wanted || n == 0 {
-            return Ok(wanted.max(0.0));
+            return Ok((wanted.max(0.0), spent));
         }
         if linear == Linear::Frozen && (worst.is_nan() || worst >= RISE * taken.before) {
             if taken.halve(pool, y, correction) {
@@ -148,7 +150,11 @@ fn solve(
             break;
         }
         let target = if linear == Linear::Exact { 0.5 * wanted } else { (0.5 * wanted).max(FORCING * worst) };
-        let mut equations = Equations { system, pool, g, diagonal, weight };
+        let mut equations = Equations { system, pool, shifted: Shifted { g, diagonal, weight } };
+        match linear {
+            Linear::Exact => equations.start(y, [correction, residual, q])?,
+            _ => correction.fill(0.0),
+        }
         spent += equations.solve(target, limits.iterations - spent, [correction, residual, p, q])?;
         taken = Taken { share: taken.next(), before: worst };
         add(pool, y, taken.share, correction);

@@ -1,6 +1,7 @@
-//! Conjugate gradients for (I − g A) x = b, matrix-free, preconditioned by the diagonal (Hestenes & Stiefel 1952).
+//! Conjugate gradients for (I − g A) x = b, matrix-free, preconditioned by what the system knows or by the
+//! diagonal (Hestenes & Stiefel 1952).
 
-use super::System;
+use super::{Shifted, System};
 use crate::error::{Error, Result};
 use crate::pool::{BLOCK, Pool};
 use crate::sum;
@@ -24,24 +25,19 @@ impl Default for Limits {
 pub struct Equations<'a> {
     pub system: &'a mut dyn System,
     pub pool: &'a Pool,
-    pub g: f64,
-    /// −diag A.
-    pub diagonal: &'a [f64],
-    pub weight: &'a [f64],
+    pub shifted: Shifted<'a>,
 }
 
 impl Equations<'_> {
-    /// Sets `x`, starting from zero, so that no |residual| exceeds `target`; `r` is the right-hand side and becomes
-    /// the residual, `p` and `q` hold nothing of use. Rows of weight zero must have r = 0 and stay x = 0.
+    /// Improves `x` until no |residual| exceeds `target`; `r` is the residual, `p` and `q` hold nothing of use. Rows of
+    /// weight zero must have x = r = 0 and stay so.
     ///
     /// Returns the number of iterations.
     ///
     /// # Errors
     /// `NotConverged` after `most` iterations; any error of the system.
     pub fn solve(&mut self, target: f64, most: u64, [x, r, p, q]: [&mut [f64]; 4]) -> Result<u64> {
-        let (g, pool, weight, diagonal, n) = (self.g, self.pool, self.weight, self.diagonal, r.len());
-        let scaled = |r: &[f64], i: usize| r[i] / (1.0 + g * diagonal[i]);
-        x.fill(0.0);
+        let (Shifted { g, weight, .. }, pool, n) = (self.shifted, self.pool, r.len());
         p.fill(0.0);
         let (mut length, mut residual) = (f64::INFINITY, f64::INFINITY);
         for iteration in 0..=most {
@@ -50,10 +46,11 @@ impl Equations<'_> {
                 return Ok(iteration);
             }
             let before = length;
-            length = sum::sum(pool, n, |i| weight[i] * r[i] * scaled(r, i));
+            self.precondition(r, q)?;
+            length = sum::sum(pool, n, |i| weight[i] * r[i] * q[i]);
             let again = length / before;
             pool.chunks(p, BLOCK, |start, part| {
-                part.iter_mut().enumerate().for_each(|(k, p)| *p = scaled(r, start + k) + again * *p);
+                part.iter_mut().enumerate().for_each(|(k, p)| *p = q[start + k] + again * *p);
             });
             self.system.apply(p, q)?;
             pool.chunks(q, BLOCK, |start, part| {
@@ -69,6 +66,35 @@ impl Equations<'_> {
             add(pool, r, -step, q);
         }
         Err(unsolved(most, residual, target))
+    }
+
+    /// Starts `x` for the right-hand side `r`, which becomes the residual: from zero; or, where a step is so long that
+    /// the rate would carry y beyond its own spread, from what makes y + x uniform, if that leaves less to do.
+    pub fn start(&mut self, y: &[f64], [x, r, q]: [&mut [f64]; 3]) -> Result<()> {
+        let (g, pool, n) = (self.shifted.g, self.pool, r.len());
+        let size = sum::max(pool, n, |i| r[i].abs());
+        if self.system.flatten(self.shifted, y, x)? && size > sum::max(pool, n, |i| x[i].abs()) {
+            self.system.apply(x, q)?;
+            pool.chunks(q, BLOCK, |start, part| {
+                part.iter_mut().enumerate().for_each(|(k, q)| *q = r[start + k] - (x[start + k] - g * *q));
+            });
+            if sum::max(pool, n, |i| q[i].abs()) < size {
+                r.copy_from_slice(q);
+                return Ok(());
+            }
+        }
+        x.fill(0.0);
+        Ok(())
+    }
+
+    fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<()> {
+        let Shifted { g, diagonal, .. } = self.shifted;
+        if !self.system.precondition(self.shifted, r, z)? {
+            self.pool.chunks(z, BLOCK, |start, part| {
+                part.iter_mut().enumerate().for_each(|(k, z)| *z = r[start + k] / (1.0 + g * diagonal[start + k]));
+            });
+        }
+        Ok(())
     }
 }
 

@@ -33,11 +33,33 @@ pub trait System {
         Ok(())
     }
 
+    /// Writes z ≈ (I − g A)⁻¹ r, self-adjoint and positive in the same inner product, and the same for the whole of a
+    /// solve. False where the system knows none, and the diagonal has to serve.
+    fn precondition(&mut self, _shifted: Shifted, _r: &[f64], _z: &mut [f64]) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// Writes x such that y + x is uniform, and Σ weight x is 0, in each part of the system that A couples: what an endless
+    /// step comes to. False where the system does not know its parts.
+    fn flatten(&mut self, _shifted: Shifted, _y: &[f64], _x: &mut [f64]) -> Result<bool> {
+        Ok(false)
+    }
+
     /// Σ weight rate(t, y), where all but a few terms of the rate are exchanges that add up to nothing, from those few:
     /// implicit methods then keep the sum to rounding. `None` where there is no such law.
     fn supply(&mut self, _t: f64, _y: &[f64]) -> Result<Option<f64>> {
         Ok(None)
     }
+}
+
+/// The matrix I − g A of a stage.
+#[derive(Clone, Copy)]
+pub struct Shifted<'a> {
+    pub g: f64,
+    /// −diag A.
+    pub diagonal: &'a [f64],
+    /// Of the inner product in which A is self-adjoint.
+    pub weight: &'a [f64],
 }
 
 /// What a system knows of its linear part.
@@ -328,6 +350,8 @@ pub struct Work {
     arrays: [Vec<f64>; 10],
     /// How far the last sub-step may be from the solution of its equations: 0 for explicit methods.
     pub slack: f64,
+    /// Iterations of conjugate gradients so far.
+    pub iterations: u64,
 }
 
 impl Work {

@@ -6,7 +6,7 @@ use super::conductivity::Law;
 use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::memory;
-use crate::operator::{Mean, Pairs};
+use crate::operator::{Mean, Multigrid, Pairs};
 use crate::pool::{BLOCK, Pool};
 use crate::sum;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -57,6 +57,10 @@ pub struct Heat<'a> {
     pub cancel: &'a AtomicBool,
     /// What exchange with the outside takes from dT/dt per kelvin, 1/s, as last linearised; empty where there is none.
     pub slopes: Vec<f64>,
+    /// The preconditioner of implicit stages, empty until it is needed; none while it is at work.
+    pub multigrid: Option<&'a mut Multigrid>,
+    /// The least length of a stage, in explicit limits, for which it is used.
+    pub stiff: f64,
     /// Applications of the operator so far.
     pub applications: u64,
 }
@@ -173,11 +177,11 @@ impl Heat<'_> {
     }
 
     /// What all pair sums are multiplied by.
-    fn factor(&self) -> f64 {
+    pub(super) fn factor(&self) -> f64 {
         if let Conductivity::Number(kappa) = self.conductivity { kappa } else { 1.0 }
     }
 
-    fn pair_kappa(&self) -> Option<(Mean, &[f64])> {
+    pub(super) fn pair_kappa(&self) -> Option<(Mean, &[f64])> {
         match &self.conductivity {
             Conductivity::Number(_) | Conductivity::Folded => None,
             Conductivity::Field(kappa) => Some((self.mean, kappa)),

@@ -3,6 +3,7 @@
 pub mod conductivity;
 pub mod fields;
 pub mod heat;
+pub mod precondition;
 pub mod surface;
 pub mod tensor;
 

@@ -13,12 +13,15 @@
 //! Where the conductivity is a tensor kappa S (tr S = nu), an operator either turns S into weights of pairs ([`once`]) or
 //! takes a gradient, a flux and a divergence ([`twice`]).
 
+pub mod aggregate;
 mod consistent;
 pub mod gradient;
 pub mod matrix;
 pub mod mean;
 pub mod moments;
+pub mod multigrid;
 pub mod once;
+pub mod sparse;
 pub mod spectrum;
 mod stencils;
 pub mod table;
@@ -27,6 +30,7 @@ pub mod twice;
 
 pub use matrix::Matrix;
 pub use mean::Mean;
+pub use multigrid::Multigrid;
 pub use once::{Assembly, Pairs};
 pub use table::Operator;
 pub use tensor::Sym;

@@ -21,6 +21,17 @@ pub fn largest(
     pool: &Pool,
     weight: &[f64],
     gershgorin: f64,
+    apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
+) -> Result<f64> {
+    let estimate = estimate(pool, weight, MOST, apply)?;
+    Ok(if estimate.is_finite() { gershgorin.min(SAFETY * estimate) } else { gershgorin })
+}
+
+/// The same estimate from at most so many applications: from below, and 0 where nothing is coupled.
+pub fn estimate(
+    pool: &Pool,
+    weight: &[f64],
+    most: usize,
     mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
 ) -> Result<f64> {
     let n = weight.len();
@@ -32,7 +43,7 @@ pub fn largest(
     };
     let length2 = |v: &[f64], by: f64| sum::sum(pool, n, |i| weight[i] * (v[i] / by) * (v[i] / by));
     let mut estimate = 0.0;
-    for iteration in 0..MOST {
+    for iteration in 0..most {
         apply(&x, &mut y)?;
         let (Some(size_x), Some(size_y)) = (norm(&x), norm(&y)) else { break };
         // Scaled by the largest element, so that no unit system over- or underflows.
@@ -45,7 +56,7 @@ pub fn largest(
             break;
         }
     }
-    Ok(if estimate.is_finite() { gershgorin.min(SAFETY * estimate) } else { gershgorin })
+    Ok(estimate)
 }
 
 /// A start vector that is rich in the fastest modes and the same on every machine: signs and sizes from a hash.

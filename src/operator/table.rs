@@ -155,6 +155,11 @@ impl Operator {
     pub fn takes_tensors(&self) -> bool {
         !matches!(self.tensor, Tensor::Scalar | Tensor::Consistent)
     }
+
+    /// Whether its stored weights are all of it.
+    pub fn is_one_matrix(&self) -> bool {
+        !matches!(self.tensor, Tensor::Twice { .. })
+    }
 }
 
 /// The operator of this name, whatever its case.

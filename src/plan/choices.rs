@@ -1,6 +1,7 @@
 //! The words that a solver is created with, read once.
 
 use super::auto::{self, Auto};
+use super::preconditioner::{self, Preconditioner};
 use super::rules::RULES;
 use crate::error::{Error, Result};
 use crate::integrator::{self, Method, Options};
@@ -55,6 +56,10 @@ pub static WORDS: &[(&str, &str)] = &[
         "residual of implicit integrators' equations, relative to the change that a stage makes (default 1e-10)",
     ),
     ("max_iterations", "most iterations of conjugate gradients in a stage of an implicit integrator (default 2000)"),
+    (
+        "preconditioner",
+        "of implicit integrators' equations: multigrid, jacobi (the diagonal) or auto: multigrid where it repays (default auto)",
+    ),
     ("threads", "worker threads; 0: as many as the process may use (default 0)"),
     ("memory", "most bytes for weights, like 2e9 (default: what the machine has available)"),
     ("without", "rules of the plan to switch off, separated by commas"),
@@ -92,6 +97,7 @@ pub struct Choices {
     pub change: f64,
     /// Most error of a sub-step, relative to the spread of T; none: sub-steps are not controlled.
     pub tolerance: Option<f64>,
+    pub preconditioner: Preconditioner,
     pub threads: usize,
     pub memory: Option<u64>,
     without: Vec<String>,
@@ -140,6 +146,14 @@ impl Choices {
         let options = options(&mut words)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
         let tolerance = tolerance(&mut words, auto.as_ref().map(|_| auto::TOLERANCE))?;
+        let preconditioner =
+            choice("preconditioner", words.take("preconditioner").unwrap_or("auto"), &preconditioner::KNOWN)?;
+        if preconditioner == Preconditioner::Multigrid && !operator.is_one_matrix() {
+            let able = table::OPERATORS.iter().filter(|o| o.dissipative && o.is_one_matrix());
+            let able = able.map(|o| o.name).collect::<Vec<_>>().join(", ");
+            let rule = format!("preconditioner=multigrid needs an operator that is one matrix: {able}");
+            return Err(Error::bad("operator", operator.name, &rule));
+        }
         let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
         let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
         let without = without(words.take("without"))?;
@@ -161,6 +175,7 @@ impl Choices {
             options,
             change,
             tolerance,
+            preconditioner,
             threads,
             memory,
             without,
@@ -276,6 +291,7 @@ mod tests {
             "tolerance=1e-5",
             "solver_tolerance=1e-6",
             "max_iterations=500",
+            "preconditioner=jacobi",
             "threads=1",
             "memory=1e9",
             "without=same_h",

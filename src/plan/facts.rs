@@ -1,6 +1,7 @@
 //! What is known about a scene before it runs: the rules decide on these and on nothing else.
 
 use super::Choices;
+use super::preconditioner::Preconditioning;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
@@ -41,6 +42,8 @@ pub struct Facts {
     pub auto: Option<String>,
     /// The integrator solves for its stages.
     pub implicit: bool,
+    /// How the equations of its stages are preconditioned.
+    pub preconditioning: Preconditioning,
     /// Arrays of n that the integrator holds.
     pub buffers: f64,
 }

@@ -4,6 +4,7 @@ pub mod auto;
 pub mod choices;
 pub mod facts;
 pub mod motion;
+pub mod preconditioner;
 pub mod prepare;
 pub mod report;
 pub mod rules;
@@ -114,8 +115,8 @@ impl Plan {
             add("kappa", When::EachStage, 8.0 * n, 0.0, "kappa(T)".into());
         }
         let (name, how) = match facts.implicit {
-            true => ("solve", "conjugate gradients on rows of weights"),
-            false => ("stages", "rows of weights"),
+            true => ("solve", format!("conjugate gradients on rows of weights; {}", facts.preconditioning.about)),
+            false => ("stages", "rows of weights".into()),
         };
         let about = match &facts.auto {
             Some(reason) => format!("auto: {reason}; {how}"),

@@ -4,9 +4,10 @@ use super::report::{Report, Timers};
 use super::state::Progress;
 use super::{Choices, Plan};
 use crate::error::{Error, Result};
-use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Schedule, System, Work};
+use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Schedule, Shifted, System, Work};
 use crate::memory;
 use crate::model::heat::{self, Heat};
+use crate::operator::multigrid::Fine;
 use crate::operator::spectrum;
 use crate::pool::Pool;
 use crate::sum;
@@ -44,6 +45,16 @@ impl System for Heat<'_> {
 
     fn apply(&mut self, x: &[f64], ax: &mut [f64]) -> Result<()> {
         self.linear(x, ax)
+    }
+
+    fn precondition(&mut self, shifted: Shifted, r: &[f64], z: &mut [f64]) -> Result<bool> {
+        let Shifted { g, diagonal, weight } = shifted;
+        Heat::precondition(self, Fine { pool: self.pool, g, diagonal, weight }, r, z)
+    }
+
+    fn flatten(&mut self, shifted: Shifted, y: &[f64], x: &mut [f64]) -> Result<bool> {
+        let Shifted { g, diagonal, weight } = shifted;
+        Heat::flatten(self, Fine { pool: self.pool, g, diagonal, weight }, y, x)
     }
 
     fn supply(&mut self, t: f64, y: &[f64]) -> Result<Option<f64>> {

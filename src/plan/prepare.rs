@@ -12,7 +12,7 @@ use crate::model::surface::{Exchange, Surface};
 use crate::model::tensor::Tensor;
 use crate::operator::table::{self, OPERATORS, Tensor as Form};
 use crate::operator::twice::Recipe;
-use crate::operator::{Assembly, Matrix, Pairs, Sym, Twice, tensor};
+use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, tensor};
 use crate::space::{Cloud, density, rows::Rows};
 use std::borrow::Cow;
 
@@ -349,6 +349,7 @@ impl State {
     pub fn with_motion<T>(&mut self, plan: &Plan, work: impl FnOnce(&mut Motion) -> Result<T>) -> Result<T> {
         let n = self.len();
         let units = self.unit_shape()?;
+        let stiff = self.preconditioning().stiff;
         let uniform = plan.leaves_out("uniform_kappa");
         let mut evaluated = memory::filled("kappa", if self.kappa_of_t() { n } else { 0 }, 0.0)?;
         let mut released = memory::filled("source", if self.source_host.is_some() { n } else { 0 }, 0.0)?;
@@ -388,7 +389,7 @@ impl State {
                 Pairs::Fresh(&assembly)
             }
         };
-        let heat = Heat {
+        let mut heat = Heat {
             pool: &self.pool,
             pairs,
             mean: self.choices.mean,
@@ -401,8 +402,13 @@ impl State {
             quiet: plan.leaves_out("quiet_rows"),
             cancel: &self.cancel,
             slopes: Vec::new(),
+            multigrid: Some(&mut self.multigrid),
+            stiff,
             applications: 0,
         };
+        if !(plan.leaves_out("keep_matrix") && heat.operator_is_fixed()) {
+            heat.multigrid.iter_mut().for_each(|m| **m = Multigrid::default());
+        }
         let mut motion = Motion {
             heat,
             pool: &self.pool,

@@ -24,6 +24,8 @@ pub struct Report {
     pub rejected: u64,
     /// The method that took it.
     pub integrator: &'static str,
+    /// Iterations of conjugate gradients, of implicit methods.
+    pub iterations: u64,
 }
 
 /// Seconds per pass, summed over the life of a solver.

@@ -88,6 +88,12 @@ pub static RULES: &[Rule] = &[
         holds: |f| !f.implicit,
     },
     Rule {
+        name: "keep_matrix",
+        reason: "the conductivity does not depend on T: the levels of multigrid are kept, whatever dt is",
+        same: Same::Bits,
+        holds: |f| f.implicit && f.preconditioning.stiff.is_finite() && !f.kappa_of_t,
+    },
+    Rule {
         name: "rate_only",
         reason: "only rates are asked for: no bound on the operator, no stages, no check",
         same: Same::Bits,

@@ -40,7 +40,8 @@ impl State {
         if self.choose(&plan, dt)? {
             plan = self.prepare("step")?;
         }
-        let (mut t, time, applications) = (self.each(fields::T)?, self.time, self.applications);
+        let (mut t, time) = (self.each(fields::T)?, self.time);
+        let (applications, iterations) = (self.applications, self.work.iterations);
         let before = self.before(&plan, &t);
         let integrator = self.choices.method.name;
         let mut report = Report { dt, integrator, energy_before: self.energy(&t), ..Report::default() };
@@ -56,6 +57,7 @@ impl State {
         self.steps += 1;
         report.time = self.time;
         report.applications = self.applications - applications;
+        report.iterations = self.work.iterations - iterations;
         report.seconds = start.elapsed().as_secs_f64();
         Ok(report)
     }

@@ -1,6 +1,7 @@
 //! Everything that a solver holds: what the host handed over, and what was derived from it, each derived thing present
 //! or absent. A setter drops what it invalidates; `prepare` makes what is missing.
 
+use super::preconditioner::Preconditioning;
 use super::report::Timers;
 use super::{Choices, Facts};
 use crate::array::Strided;
@@ -12,7 +13,7 @@ use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
 use crate::model::heat::Callback;
 use crate::model::surface::Surface;
 use crate::operator::table::Tensor;
-use crate::operator::{Matrix, Sym, Twice};
+use crate::operator::{Matrix, Multigrid, Sym, Twice};
 use crate::pool::Pool;
 use crate::space::{Cloud, Domain};
 use std::borrow::Cow;
@@ -120,6 +121,8 @@ pub struct State {
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
     pub bounds: Option<Bounds>,
+    /// The preconditioner of implicit steps; empty where it is not needed or was not yet.
+    pub multigrid: Multigrid,
 
     /// Steps taken and rates asked for, and whether particles or kappa changed after the first.
     pub steps: u64,
@@ -152,6 +155,7 @@ impl State {
             inverse_capacity: None,
             surface: None,
             bounds: None,
+            multigrid: Multigrid::default(),
             steps: 0,
             rates: 0,
             moves: false,
@@ -279,9 +283,13 @@ impl State {
             fields::M | fields::RHO | fields::H => self.drop_geometry(),
             fields::KAPPA if self.directions.is_none() => self.drop_kappa(),
             slot if slot == fields::KAPPA || fields::TENSOR.contains(&slot) => self.drop_directions(),
-            fields::C_V | fields::FIXED => (self.inverse_capacity, self.bounds) = (None, None),
+            fields::C_V | fields::FIXED => {
+                self.inverse_capacity = None;
+                self.forget_operator();
+            }
             fields::FLUX_IN | fields::H_CONV | fields::EMISSIVITY | fields::T_AMBIENT | fields::AREA => {
-                (self.surface, self.bounds) = (None, None);
+                self.surface = None;
+                self.forget_operator();
             }
             _ => {}
         }
@@ -296,13 +304,19 @@ impl State {
     /// Makes the next step build everything anew.
     pub fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
-        (self.surface, self.bounds) = (None, None);
+        self.surface = None;
+        self.forget_operator();
+    }
+
+    /// Makes the next step look at the operator anew.
+    fn forget_operator(&mut self) {
+        (self.bounds, self.multigrid) = (None, Multigrid::default());
     }
 
     /// The conductivity changed.
     pub fn drop_kappa(&mut self) {
         self.kappa_changes |= self.steps + self.rates > 0;
-        self.bounds = None;
+        self.forget_operator();
         if self.weights.as_ref().is_some_and(|w| w.folded) {
             self.weights = None;
         }
@@ -332,7 +346,8 @@ impl State {
 
     pub fn set_sigma_sb(&mut self, value: f64) {
         self.sigma_sb = value;
-        (self.surface, self.bounds) = (None, None);
+        self.surface = None;
+        self.forget_operator();
     }
 
     /// The area of a particle that faces outside: as given, or one face of a cube of its volume. Needs the geometry.
@@ -401,8 +416,16 @@ impl State {
             integrator: choices.method.name,
             auto: choices.auto.as_ref().map(|auto| auto.reason.clone()),
             implicit: choices.method.is_implicit(),
+            preconditioning: self.preconditioning(),
             buffers: self.work.bytes() as f64 / 8.0 / self.len().max(1) as f64,
         }
+    }
+
+    /// How the equations of implicit stages are preconditioned.
+    pub fn preconditioning(&self) -> Preconditioning {
+        let radiates = self.surface.as_ref().is_some_and(|s| !s.is_linear());
+        let (choices, once) = (&self.choices, self.moves || self.kappa_of_t() || radiates);
+        choices.preconditioner.settle(choices.operator.is_one_matrix(), once)
     }
 
     /// Bytes held for particles and weights.
@@ -420,6 +443,7 @@ impl State {
             + inputs
             + capacity
             + memory::bytes(&self.last_h)
+            + self.multigrid.bytes()
             + self.work.bytes()
     }
 }
