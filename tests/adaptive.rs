@@ -138,7 +138,7 @@ fn auto_chooses_by_stiffness_and_the_plan_says_so() {
     for (words, stiffness, expected) in [
         ("", 40.0, "rkl2"),
         ("", 1e6, "sdirk2"),
-        ("tolerance=off", 1e3, "rkl2"),
+        ("tolerance=off", 300.0, "rkl2"),
         ("tolerance=off", 1e4, "sdirk2"),
         ("bounds=keep", 40.0, "ssprk3"),
         ("bounds=keep", 1e3, "backward-euler"),
