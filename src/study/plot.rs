@@ -75,17 +75,21 @@ impl Axis {
     fn text(&self, at: f64) -> String {
         match (self.log, 10f64.powf(at)) {
             (false, _) => format!("{}", (at * 1e4).round() / 1e4),
-            (true, v) if (0.0999..1e4).contains(&v) => format!("{}", (v * 10.0).round() / 10.0),
+            (true, v) if (0.00999..1e4).contains(&v) => format!("{}", (v * 1e3).round() / 1e3),
             (true, v) => format!("{v:.0e}"),
         }
     }
 
-    /// Round numbers within a range: steps of 1, 2 or 5, or on a logarithmic axis decades and, where these are few, their
-    /// doubles and fives.
+    /// Round numbers within a range: steps of 1, 2 or 5, or on a logarithmic axis decades and, where these are few, what
+    /// lies between.
     fn ticks(&self, [low, high]: [f64; 2]) -> Vec<f64> {
         let inside = |v: &f64| *v >= low && *v <= high;
         if self.log {
-            let leading: &[f64] = if high - low > 2.0 { &[1.0] } else { &[1.0, 2.0, 5.0] };
+            let leading: &[f64] = match high - low {
+                few if few <= 1.0 => &[1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 8.0],
+                some if some <= 2.0 => &[1.0, 2.0, 5.0],
+                _ => &[1.0],
+            };
             let decades = low.floor() as i32..=high.ceil() as i32;
             return decades
                 .flat_map(|d| leading.iter().map(move |m| m.log10() + f64::from(d)))
@@ -280,7 +284,7 @@ mod tests {
         let texts =
             |axis: &Axis, range: [f64; 2]| axis.ticks(range).into_iter().map(|t| axis.text(t)).collect::<Vec<_>>();
         assert_eq!(texts(&log, [1.1, 2.2]), ["20", "50", "100"]);
-        assert_eq!(texts(&log, [-4.2, -0.9]), ["1e-4", "1e-3", "1e-2", "0.1"].map(String::from).to_vec()[..]);
+        assert_eq!(texts(&log, [-4.2, -0.9]), ["1e-4", "1e-3", "0.01", "0.1"]);
         assert_eq!(texts(&Axis::linear("h"), [0.74, 2.06]), ["0.8", "1", "1.2", "1.4", "1.6", "1.8", "2"]);
     }
 
