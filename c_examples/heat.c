@@ -1,4 +1,4 @@
-/* A wave of heat in a periodic box, from C: create, set, ask for advice, step, get, files, and an error made on purpose.
+/* A wave of heat in a periodic box, from C: create, set, step, get, files, and an error made on purpose.
  *
  * T = 300 + sin(2 pi x) decays as exp(-(2 pi)^2 kappa / (rho c_v) t), which the program compares with at the end. */
 #include <diffusph.h>
@@ -47,7 +47,7 @@ int main(void)
     const double lo[2] = {0.0, 0.0}, hi[2] = {1.0, 1.0};
     const int32_t periodic[2] = {1, 1};
     const double rho = 2.0, kappa = 0.6, c_v = 3.0, t = 0.1, k = 2.0 * pi;
-    double energy, advised_error, advised_seconds;
+    double energy;
     diffusph_report report = DIFFUSPH_REPORT_INIT;
     diffusph_solver *s;
     char why[512], plan[4096];
@@ -84,12 +84,6 @@ int main(void)
         return failed(s, "plan");
     }
     puts(plan);
-
-    /* What would reach an error of 5 % cheapest? Many choices are tried; the solver stays as it is. */
-    if (diffusph_recommend(s, 0.05, t / STEPS, plan, sizeof plan, &advised_error, &advised_seconds)) {
-        return failed(s, "recommend");
-    }
-    printf("for an error of 5 %%: \"%s\" (%.1e in %.1e s)\n", plan, advised_error, advised_seconds);
 
     if (diffusph_get_number(s, "energy", &energy) || diffusph_write_series(s, "heat.pvd")) {
         return failed(s, "start");

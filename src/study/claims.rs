@@ -123,7 +123,7 @@ fn tensor_error(operator: &str, n: usize, waves: [f64; 2]) -> Result<f64> {
 /// 3: the second derivative matters even where it is not explicit.
 fn implicit(page: &mut Page, table: &mut Table, request: &Request, _: &[Sample]) -> Result<()> {
     const KERNELS: [&str; 4] = ["M4", "M6", "C2", "C4"];
-    let (line, space) = request.pick((20, 4), (60, 5), (200, 24));
+    let (line, space) = request.pick((16, 2), (60, 5), (200, 24));
     let mut said = Vec::new();
     let mut all = Vec::new();
     for (dim, n, step) in [(1, line, 0.1), (3, space, request.pick(0.3, 0.1, 0.05))] {
@@ -137,18 +137,17 @@ fn implicit(page: &mut Page, table: &mut Table, request: &Request, _: &[Sample])
             let claim = format!("3 rank correlation of the tube's l2 with |K_d2 - 1|, {kernel}: plain, without trend");
             let cloud = if dim == 1 { "line" } else { FCC.name };
             table.push([claim.into(), cloud.into(), plain.into(), rank.into(), f64::NAN.into()]);
-            ranks.push((kernel, rank));
+            // Where the gas fell apart at most h_fac there is none.
+            ranks.extend(rank.is_finite().then_some((kernel, rank)));
         }
         let yes = ranks.iter().filter(|(_, rank)| *rank > 0.5).count();
         let ranks: Vec<String> = ranks.iter().map(|(kernel, rank)| format!("{kernel} {rank:.2}")).collect();
-        said.push(format!("in {dim}-D for {yes} of {} kernels ({})", KERNELS.len(), ranks.join(", ")));
-        all.push(yes);
+        said.push(format!("in {dim}-D for {yes} of {} kernels ({})", ranks.len(), ranks.join(", ")));
+        all.push((yes, ranks.len()));
     }
-    let answer = match all[..] {
-        [4, 4] => "true",
-        [0, 0] => "false",
-        [.., 4] => "true in 3-D, in 1-D only for some kernels",
-        [4, ..] => "true in 1-D, in 3-D only for some kernels",
+    let answer = match [all.iter().all(|(yes, of)| yes == of), all.iter().all(|(yes, _)| *yes == 0)] {
+        [true, _] => "true",
+        [_, true] => "false",
         _ => "true only for some kernels",
     };
     page.find(format!(
@@ -180,7 +179,7 @@ fn cost(page: &mut Page, table: &mut Table, request: &Request, samples: &[Sample
     let second = (m4.second / m6.second).abs();
     table.push([claim("K_d2 - 1").into(), FCC.name.into(), m4.second.into(), m6.second.into(), second.into()]);
     let mut tube = Vec::new();
-    for (dim, n, cloud) in [(1, request.pick(40, 60, 400), "line"), (3, request.pick(4, 8, 24), FCC.name)] {
+    for (dim, n, cloud) in [(1, request.pick(16, 60, 400), "line"), (3, request.pick(2, 8, 24), FCC.name)] {
         let found = tubes(dim, n, &[("M4", 1.35, 1.4), ("M6", 0.9, 1.4)], |_| true)?;
         let (t4, t6) = (found[0].l2, found[1].l2);
         table.push([claim("l2 of the tube").into(), cloud.into(), t4.into(), t6.into(), (t4 / t6).into()]);

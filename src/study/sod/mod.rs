@@ -80,8 +80,8 @@ fn h_facs(last: f64, steps: u32) -> impl Iterator<Item = f64> + Clone {
 /// As [`Shock::of`].
 pub fn run(mut request: Request) -> Result<Page> {
     let mut page = Page::new("sod", "Shock tube: density error against h_fac for every kernel, in 1-D and 3-D");
-    let (line, steps) = request.pick((40, 2), (60, 6), (400, 24));
-    let (space, few) = request.pick((4, 1), (5, 3), (24, 12));
+    let (line, steps) = request.pick((16, 2), (60, 6), (400, 24));
+    let (space, few) = request.pick((2, 1), (5, 3), (24, 12));
     // In 3-D supports of twice the default reach a thousand neighbours.
     let h_facs_in = [h_facs(2.0, steps), h_facs(1.4, few)].map(|h| h.collect::<Vec<_>>());
     let sets = [(1, line), (3, space)].into_iter().zip(h_facs_in);
