@@ -22,6 +22,7 @@ module diffusph
     integer(c_int32_t), parameter :: DIFFUSPH_CANCELLED = 5
     integer(c_int32_t), parameter :: DIFFUSPH_NOT_CONVERGED = 6
     integer(c_int32_t), parameter :: DIFFUSPH_CALLBACK_FAILED = 7
+    integer(c_int32_t), parameter :: DIFFUSPH_OUT_OF_REACH = 8
     integer(c_int32_t), parameter :: DIFFUSPH_NULL_POINTER = -1
     integer(c_int32_t), parameter :: DIFFUSPH_BAD_VALUE = -2
     integer(c_int32_t), parameter :: DIFFUSPH_WRONG_COUNT = -3
@@ -239,6 +240,16 @@ module diffusph
             character(kind=c_char), intent(inout), optional :: buf(*)
             integer(c_int64_t), value :: len
             integer(c_int64_t), intent(inout), optional :: needed
+            integer(c_int32_t) :: status
+        end function
+
+        function diffusph_recommend(s, wanted, dt, words, words_len, error, seconds) bind(c) result(status)
+            import :: c_char, c_double, c_int32_t, c_int64_t, c_ptr
+            type(c_ptr), value :: s
+            real(c_double), value :: wanted, dt
+            character(kind=c_char), intent(inout) :: words(*)
+            integer(c_int64_t), value :: words_len
+            real(c_double), intent(inout) :: error, seconds
             integer(c_int32_t) :: status
         end function
 

@@ -85,6 +85,11 @@
 #define DIFFUSPH_CALLBACK_FAILED 7
 
 /**
+ * No choice is known to be as accurate as was asked for.
+ */
+#define DIFFUSPH_OUT_OF_REACH 8
+
+/**
  * A pointer that must not be NULL is.
  */
 #define DIFFUSPH_NULL_POINTER -1
@@ -479,6 +484,31 @@ int32_t diffusph_rate(struct diffusph_solver *s, double *out, int64_t n, int64_t
  * Errors: OUT_OF_ORDER before diffusph_set_particles and masses.
  */
 int32_t diffusph_plan(struct diffusph_solver *s, char *buf, int64_t len, int64_t *needed);
+
+/**
+ * Which operator, kernel, h_fac and integrator reach an error cheapest on these particles, with T, kappa and all else as
+ * they are now: many choices are tried on solvers of their own, which lasts as long as some hundred steps of dt. This
+ * solver stays as it is. A given h is left aside, since h_fac is part of the choice; the progress callback is told the
+ * share of choices tried, and callbacks of kappa and of the source are called for each.
+ *
+ * \param wanted    the most that T may be wrong by after dt: sqrt(sum (T - known)^2 / sum (known - mean)^2)
+ * \param dt        s, positive; a step that is typical for the host
+ * \param words     receives what to create a solver with
+ * \param words_len bytes that fit there
+ * \param error     receives what that choice errs by, the doubt of the reference included: weights that are exact for
+ *                  polynomials of degree 6, or 4 where that fails
+ * \param seconds   receives its wall-clock time from particles to answer, s: neighbours, weights, and a step of dt
+ *
+ * Errors: OUT_OF_REACH naming the most accurate choice; BAD_VALUE, also for a tensor kappa, for which there is no
+ * reference; CANCELLED; as diffusph_step.
+ */
+int32_t diffusph_recommend(struct diffusph_solver *s,
+                           double wanted,
+                           double dt,
+                           char *words,
+                           int64_t words_len,
+                           double *error,
+                           double *seconds);
 
 /**
  * A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. Vectors (x,

@@ -34,6 +34,10 @@ pub enum Error {
     NotConverged { what: String, iterations: u64, residual: f64, wanted: f64, remedy: String },
     #[error("the {which} callback returned {code}; nothing was changed")]
     CallbackFailed { which: String, code: i32 },
+    #[error(
+        "no choice is known to err by less than {wanted:e} on these particles; the best is '{best}' with {error:e}, which includes what the reference may be wrong by, {reference:e}; ask for less, or use more particles"
+    )]
+    OutOfReach { wanted: f64, best: String, error: f64, reference: f64 },
 
     // The call was wrong.
     #[error("{argument} is NULL; pass {expected}")]
@@ -96,6 +100,7 @@ impl Error {
             Error::Cancelled => 5,
             Error::NotConverged { .. } => 6,
             Error::CallbackFailed { .. } => 7,
+            Error::OutOfReach { .. } => 8,
             Error::NullPointer { .. } => -1,
             Error::BadValue { .. } | Error::BadElement { .. } => -2,
             Error::WrongCount { .. } => -3,
@@ -140,6 +145,7 @@ pub static CODES: &[(i32, &str)] = &[
     (5, "CANCELLED"),
     (6, "NOT_CONVERGED"),
     (7, "CALLBACK_FAILED"),
+    (8, "OUT_OF_REACH"),
     (-1, "NULL_POINTER"),
     (-2, "BAD_VALUE"),
     (-3, "WRONG_COUNT"),

@@ -89,9 +89,23 @@ pub fn choice<T: Copy>(what: &str, word: &str, table: &[(&'static str, T)]) -> R
     found.map(|(_, value)| *value).ok_or_else(|| Error::unknown(what, word, table.iter().map(|(name, _)| name)))
 }
 
+/// A line with these words in place of its own of the same keys, and without those of the keys in `dropped`.
+pub fn replaced(line: &str, words: &str, dropped: &[&str]) -> String {
+    let key = |word: &'_ str| word.split_once('=').map(|(key, _)| key.to_string());
+    let new: Vec<String> = words.split_whitespace().filter_map(key).collect();
+    let stays = |word: &&str| key(word).is_none_or(|key| !new.contains(&key) && !dropped.contains(&key.as_str()));
+    line.split_whitespace().filter(stays).chain(words.split_whitespace()).collect::<Vec<_>>().join(" ")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn words_take_the_place_of_those_of_their_key() {
+        let line = replaced("heat dim=2 kernel=M4 normalise=pair", "kernel=C2 order=4", &["normalise"]);
+        assert_eq!(line, "heat dim=2 kernel=C2 order=4");
+    }
 
     #[test]
     fn every_word_is_used_or_refused() {

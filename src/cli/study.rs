@@ -15,7 +15,7 @@ pub struct StudyArgs {
     /// Report as JSON
     #[arg(long)]
     json: bool,
-    /// Write its files into this folder as well: text, JSON, and where there are any tables (CSV) and a page with plots (HTML)
+    /// Write its files into this folder as well: text, JSON, and where there are any tables (CSV), plots (SVG) and a page with all of it (HTML)
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// With more particles, and for as long as that takes

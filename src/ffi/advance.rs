@@ -2,9 +2,10 @@
 
 use super::codes::{DIFFUSPH_LOG_DEBUG, DIFFUSPH_LOG_INFO};
 use super::guard::{Handle, Inside, with};
-use super::pointers::{copy_out, place, strided_mut};
+use super::pointers::{copy_out, place, room, strided_mut};
 use super::report::{Place, Report};
 use crate::error::{Error, Result};
+use crate::study::recommend;
 use std::ffi::c_char;
 
 /// Advances by exactly dt, in as many sub-steps as the method needs. Whatever goes wrong, the solver is as it was before.
@@ -124,6 +125,46 @@ pub unsafe extern "C" fn diffusph_plan(s: *mut Handle, buf: *mut c_char, len: i6
             if !needed.is_null() {
                 *place("needed", needed)? = text.len() as i64 + 1;
             }
+            Ok(())
+        })
+    }
+}
+
+/// Which operator, kernel, h_fac and integrator reach an error cheapest on these particles, with T, kappa and all else as
+/// they are now: many choices are tried on solvers of their own, which lasts as long as some hundred steps of dt. This
+/// solver stays as it is. A given h is left aside, since h_fac is part of the choice; the progress callback is told the
+/// share of choices tried, and callbacks of kappa and of the source are called for each.
+///
+/// \param wanted    the most that T may be wrong by after dt: sqrt(sum (T - known)^2 / sum (known - mean)^2)
+/// \param dt        s, positive; a step that is typical for the host
+/// \param words     receives what to create a solver with
+/// \param words_len bytes that fit there
+/// \param error     receives what that choice errs by, the doubt of the reference included: weights that are exact for
+///                  polynomials of degree 6, or 4 where that fails
+/// \param seconds   receives its wall-clock time from particles to answer, s: neighbours, weights, and a step of dt
+///
+/// Errors: OUT_OF_REACH naming the most accurate choice; BAD_VALUE, also for a tensor kappa, for which there is no
+/// reference; CANCELLED; as diffusph_step.
+///
+/// # Safety
+/// The header's conventions.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn diffusph_recommend(
+    s: *mut Handle,
+    wanted: f64,
+    dt: f64,
+    words: *mut c_char,
+    words_len: i64,
+    error: *mut f64,
+    seconds: *mut f64,
+) -> i32 {
+    unsafe {
+        with(s, |inside| {
+            let (error, seconds) = (place("error", error)?, place("seconds", seconds)?);
+            room("words", words, words_len)?;
+            let found = recommend::recommend(&mut inside.solver, wanted, dt)?;
+            copy_out("words", words, words_len, &found.words)?;
+            (*error, *seconds) = (found.error, found.seconds);
             Ok(())
         })
     }

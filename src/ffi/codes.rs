@@ -16,6 +16,8 @@ pub const DIFFUSPH_CANCELLED: i32 = 5;
 pub const DIFFUSPH_NOT_CONVERGED: i32 = 6;
 /// A callback of the host answered with a code other than 0.
 pub const DIFFUSPH_CALLBACK_FAILED: i32 = 7;
+/// No choice is known to be as accurate as was asked for.
+pub const DIFFUSPH_OUT_OF_REACH: i32 = 8;
 /// A pointer that must not be NULL is.
 pub const DIFFUSPH_NULL_POINTER: i32 = -1;
 /// An argument, or an element of an array, has no meaning.

@@ -120,15 +120,20 @@ fn layout(n: i64, stride: i64, components: usize) -> Result<(usize, usize, usize
     Ok((particles, step, doubles.ok_or_else(|| Error::bad("n", n, "n * stride does not fit the address space"))?))
 }
 
+/// Bytes for text in the host's buffer, beside the NUL.
+pub fn room(argument: &str, buf: *mut c_char, len: i64) -> Result<usize> {
+    not_null(argument, buf, "a buffer for text")?;
+    let bytes = usize::try_from(len).ok().filter(|bytes| *bytes > 0);
+    let bytes = bytes.ok_or_else(|| Error::bad(&format!("{argument}_len"), len, "a buffer needs at least one byte"))?;
+    Ok(bytes - 1)
+}
+
 /// Copies a text into the host's buffer, cut where it does not fit, always with a NUL at the end.
 ///
 /// # Safety
 /// `buf` is NULL or has `len` writable bytes.
 pub unsafe fn copy_out(argument: &str, buf: *mut c_char, len: i64, text: &str) -> Result<()> {
-    not_null(argument, buf, "a buffer for text")?;
-    let room = usize::try_from(len).ok().filter(|room| *room > 0);
-    let room = room.ok_or_else(|| Error::bad(&format!("{argument}_len"), len, "a buffer needs at least one byte"))?;
-    let fits = text.floor_char_boundary(room - 1);
+    let fits = text.floor_char_boundary(room(argument, buf, len)?);
     // SAFETY: not NULL, and `fits` + 1 <= `len`; the rest is the caller's word.
     unsafe {
         std::ptr::copy_nonoverlapping(text.as_ptr(), buf.cast(), fits);

@@ -6,11 +6,13 @@
 //! | `mod` | create, set, step |
 //! | `query` | get: fields and numbers, computed when asked for |
 //! | `files` | particles from and to VTK files |
+//! | `trial` | the same particles with other words |
 //! | `catalogue` | what can be chosen, by name |
 
 pub mod catalogue;
 mod files;
 mod query;
+pub mod trial;
 
 use crate::array::{Strided, StridedMut};
 use crate::error::{Error, Result};

@@ -2,7 +2,7 @@
 
 use super::page::Page;
 use super::run::Watch;
-use super::{claims, convergence, kernels, positivity, sod, stability, work};
+use super::{claims, convergence, kernels, peers, positivity, sod, stability, work};
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 
@@ -78,13 +78,18 @@ pub static STUDIES: &[Entry] = &[
     },
     Entry {
         name: "sod",
-        about: "density error of the shock tube against h_fac for every kernel, 1-D",
+        about: "density error of the shock tube against h_fac for every kernel, 1-D and 3-D",
         run: |request| answer(sod::run(request)?),
     },
     Entry {
         name: "work-precision",
         about: "error against run time and pair operations, for operator, kernel, h_fac, integrator and resolution",
         run: |request| answer(work::run(request)?),
+    },
+    Entry {
+        name: "peers",
+        about: "other codes on the same particles, where python3 has them: their error and run time beside ours",
+        run: |request| answer(peers::run(request)?),
     },
     Entry {
         name: "claims",

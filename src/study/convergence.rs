@@ -1,9 +1,11 @@
 //! Error of a decaying mode against resolution: every operator, on lattices and on disordered particles.
 
+use super::batch;
 use super::catalogue::Request;
-use super::mode::{CUBIC, Cloud, FCC, GLASS, HEXAGONAL, JITTER_2D, JITTER_3D, SQUARE, refused, variants};
+use super::mode::{CUBIC, FCC, GLASS_2D, GLASS_3D, HEXAGONAL, JITTER_2D, JITTER_3D, SQUARE, Sample, variants};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
+use super::recommend::refused;
 use super::run::Study;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;
@@ -21,60 +23,56 @@ pub struct Run {
 }
 
 /// The time is integrated by explicit steps at the stability limit of a third-order method: 1e-4 of the error or less.
-const EXACT_IN_TIME: &str = "integrator=ssprk3";
+const EXACT_IN_TIME: &str = "integrator=ssprk3 bounds=free";
 
 impl Run {
     /// # Errors
     /// As [`Study::run`], unless the operator is refused on these particles.
-    pub fn of(cloud: &Cloud, n: usize, kernel: &'static str, (words, name): &(String, String)) -> Result<Run> {
-        let scene = cloud.scene(n, &format!("kernel={kernel} {words} {EXACT_IN_TIME}"))?;
+    pub fn of(sample: &Sample, kernel: &'static str, (words, name): &(String, String)) -> Result<Run> {
+        let scene = sample.scene(&format!("kernel={kernel} {words} {EXACT_IN_TIME} threads=1"));
         let done = Study::new(scene, Path::new("")).and_then(|s| s.run(Path::new(""), Box::new(|_| true)));
         let (particles, error) = match done {
             Ok(report) => (report.particles, report.accuracy.map_or(f64::NAN, |a| a.l2)),
             Err(e) if refused(&e) => (0, f64::NAN),
             Err(e) => return Err(e),
         };
-        Ok(Run { cloud: cloud.name, kernel, operator: name.clone(), n, particles, error })
+        Ok(Run { cloud: sample.cloud.name, kernel, operator: name.clone(), n: sample.n, particles, error })
     }
 }
 
-fn clouds(request: &Request) -> Vec<(Cloud, Vec<usize>)> {
-    let plane = request.pick(vec![16, 32], vec![16, 32, 64, 128], vec![16, 32, 64, 128, 256]);
-    let space = request.pick(vec![6, 8], vec![8, 12, 16, 24], vec![8, 16, 24, 32, 48]);
-    let mut clouds: Vec<_> = [SQUARE, HEXAGONAL, JITTER_2D].map(|c| (c, plane.clone())).into();
-    clouds.extend([CUBIC, FCC, JITTER_3D].map(|c| (c, space.clone())));
-    if !request.tiny && GLASS.is_here() {
-        clouds.push((GLASS, vec![24]));
-    }
-    clouds
+/// The samples of each cloud, coarse to fine.
+fn samples(request: &Request) -> Result<Vec<Vec<Sample>>> {
+    let plane = request.pick(vec![16, 32], vec![16, 32, 64], vec![16, 32, 64, 128]);
+    let space = request.pick(vec![6, 8], vec![8, 12, 16], vec![8, 16, 24, 32, 48]);
+    // Glasses take their time.
+    let [flat, deep] = [&plane, &space].map(|sizes| sizes[..sizes.len() - 1].to_vec());
+    let plane = [(SQUARE, &plane), (HEXAGONAL, &plane), (JITTER_2D, &plane), (GLASS_2D, &flat)];
+    let space = [(CUBIC, &space), (FCC, &space), (JITTER_3D, &space), (GLASS_3D, &deep)];
+    let of = |(cloud, sizes): (_, &Vec<usize>)| sizes.iter().map(|n| Sample::new(cloud, *n)).collect();
+    plane.into_iter().chain(space).map(of).collect()
 }
 
 /// # Errors
 /// As [`Run::of`].
 pub fn run(mut request: Request) -> Result<Page> {
     let mut page = Page::new("convergence", "Convergence for isotropic heat conduction with various methods");
-    let kernels: &[&'static str] = request.pick(&["M6"], &["M4", "M6"], &["M4", "M6", "M8", "C2", "C4", "C6"]);
-    let (clouds, variants) = (clouds(&request), variants());
+    let kernels: &[&'static str] = request.pick(&["M6"], &["M6"], &["M4", "M6", "M8", "C2", "C4", "C6"]);
+    let (samples, variants) = (samples(&request)?, variants());
     let mut cases = Vec::new();
-    for (cloud, sizes) in &clouds {
-        for kernel in kernels.iter().filter(|k| request.full || cloud.name != GLASS.name || **k == "M6") {
-            cases.extend(variants.iter().flat_map(|v| sizes.iter().map(move |n| (cloud, *n, *kernel, v))));
+    for sizes in &samples {
+        for kernel in kernels {
+            cases.extend(variants.iter().flat_map(|v| sizes.iter().map(move |sample| (sample, *kernel, v))));
         }
     }
-    let mut runs = Vec::new();
-    for (done, (cloud, n, kernel, variant)) in cases.iter().enumerate() {
-        if !request.goes_on(done, cases.len()) {
-            page.complete = false;
-            break;
-        }
-        runs.push(Run::of(cloud, *n, kernel, variant)?);
-    }
+    let runs = batch::map(
+        &cases,
+        |(sample, kernel, variant)| Run::of(sample, kernel, variant),
+        |done| request.goes_on(done, cases.len()),
+    )?;
+    page.complete = runs.len() == cases.len();
     page.tables = vec![orders(&runs), table(&runs)];
-    page.plots = clouds.iter().filter(|(_, sizes)| sizes.len() > 1).map(|(cloud, _)| plot(&runs, cloud.name)).collect();
+    page.plots = samples.iter().map(|sizes| plot(&runs, sizes[0].cloud.name)).collect();
     say(&mut page, &runs);
-    if !GLASS.is_here() {
-        page.find("no glass: its file lies in the source of this program, which is not here");
-    }
     Ok(page)
 }
 
@@ -147,11 +145,12 @@ mod tests {
     #[test]
     fn a_lattice_converges_until_its_moment_shows_and_disorder_does_not() {
         let pair = ("operator=brookshaw normalise=pair".to_string(), "b".to_string());
-        let run = |cloud: &Cloud, n| Run::of(cloud, n, "M6", &pair).unwrap();
+        let of = |cloud, n, variant| Run::of(&Sample::new(cloud, n).unwrap(), "M6", variant).unwrap();
+        let run = |cloud, n| of(cloud, n, &pair);
         // e4 h² k⁴ t: second order.
-        assert!((order(&run(&SQUARE, 16), &run(&SQUARE, 32)) - 2.0).abs() < 0.15);
-        assert!(order(&run(&JITTER_2D, 32), &run(&JITTER_2D, 64)).abs() < 1.0);
+        assert!((order(&run(SQUARE, 16), &run(SQUARE, 32)) - 2.0).abs() < 0.15);
+        assert!(order(&run(JITTER_2D, 32), &run(JITTER_2D, 64)).abs() < 1.0);
         let direct = ("operator=direct normalise=none".to_string(), "d".to_string());
-        assert!(run(&HEXAGONAL, 16).error < 0.1 && Run::of(&SQUARE, 16, "M6", &direct).unwrap().error < 0.2);
+        assert!(run(HEXAGONAL, 16).error < 0.1 && of(SQUARE, 16, &direct).error < 0.2);
     }
 }

@@ -1,7 +1,8 @@
 //! Second and first moment of every operator against h_fac: how good a Laplacian each kernel makes, and where it is best.
 
+use super::batch;
 use super::catalogue::Request;
-use super::mode::{CUBIC, Cloud, FCC, GLASS, HEXAGONAL, JITTER_2D, JITTER_3D, LINE, SQUARE};
+use super::mode::{CUBIC, FCC, GLASS_2D, GLASS_3D, HEXAGONAL, JITTER_2D, JITTER_3D, LINE, SQUARE, Sample};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
 use super::setup::setup;
@@ -31,9 +32,10 @@ impl Moments {
     ///
     /// # Errors
     /// As [`crate::Solver::get`].
-    pub fn of(cloud: &Cloud, n: usize, kernel: &'static str, operator: &'static str, h_fac: f64) -> Result<Moments> {
-        let words = format!("kernel={kernel} operator={operator} h_fac={h_fac} normalise=none");
-        let (mut solver, _) = setup(&cloud.scene(n, &words)?, Path::new(""))?;
+    pub fn of(sample: &Sample, kernel: &'static str, operator: &'static str, h_fac: f64) -> Result<Moments> {
+        let cloud = &sample.cloud;
+        let words = format!("kernel={kernel} operator={operator} h_fac={h_fac} normalise=none threads=1");
+        let (mut solver, _) = setup(&sample.scene(&words), Path::new(""))?;
         let off: Vec<f64> = solver.get_all("K_d2")?.iter().map(|k| k - 1.0).collect();
         let sign = if off.iter().all(|k| *k < 0.0) { -1.0 } else { 1.0 };
         // Of vectors, over particles.
@@ -49,11 +51,12 @@ fn rms(values: &[f64]) -> f64 {
 }
 
 /// On lattices a few particles are as good as many; disorder wants a mean.
-fn clouds(request: &Request) -> Vec<(Cloud, usize)> {
+fn samples(request: &Request) -> Result<Vec<Sample>> {
     let lattices = [(LINE, 8), (SQUARE, 4), (HEXAGONAL, 4), (CUBIC, 3), (FCC, 4)];
-    let few = vec![(JITTER_2D, 12), (JITTER_3D, 6)];
-    let disordered = request.pick(Vec::new(), few, vec![(JITTER_2D, 64), (JITTER_3D, 16), (GLASS, 24)]);
-    lattices.into_iter().chain(disordered).filter(|(cloud, _)| cloud.is_here()).collect()
+    let (plane, space) = request.pick((0, 0), (12, 6), (64, 16));
+    let disordered = [(JITTER_2D, plane), (GLASS_2D, plane), (JITTER_3D, space), (GLASS_3D, space)];
+    let all = lattices.into_iter().chain(disordered).filter(|(_, n)| *n > 0);
+    all.map(|(cloud, n)| Sample::new(cloud, n)).collect()
 }
 
 /// From 0.8 to 2.0.
@@ -66,27 +69,24 @@ fn h_facs(steps: u32) -> Vec<f64> {
 pub fn run(mut request: Request) -> Result<Page> {
     let mut page = Page::new("kernels", "Second derivative normalisation of every kernel and operator against h_fac");
     let kernels: Vec<&'static str> = kernel::catalogue().map(|(name, _)| name).collect();
-    let (clouds, h_facs) = (clouds(&request), h_facs(request.pick(12, 24, 48)));
-    let all = clouds.len() * kernels.len();
-    let mut found = Vec::new();
-    'all: for (c, (cloud, n)) in clouds.iter().enumerate() {
-        for (k, kernel) in kernels.iter().enumerate() {
-            if !request.goes_on(c * kernels.len() + k, all) {
-                page.complete = false;
-                break 'all;
-            }
+    let (samples, h_facs) = (samples(&request)?, h_facs(request.pick(12, 24, 48)));
+    let mut cases = Vec::new();
+    for sample in &samples {
+        for kernel in &kernels {
             // The weights of the others are one of these.
             for operator in OPERATORS.iter().filter(|o| matches!(o.tensor, Tensor::Scalar)) {
-                for h_fac in &h_facs {
-                    found.push(Moments::of(cloud, *n, kernel, operator.name, *h_fac)?);
-                }
+                cases.extend(h_facs.iter().map(|h_fac| (sample, *kernel, operator.name, *h_fac)));
             }
         }
     }
+    let found = batch::map(
+        &cases,
+        |(sample, kernel, operator, h_fac)| Moments::of(sample, kernel, operator, *h_fac),
+        |done| request.goes_on(done, cases.len()),
+    )?;
+    page.complete = found.len() == cases.len();
     page.tables = vec![summary(&found), sweet_spots(&found), table(&found)];
-    for (cloud, _) in &clouds {
-        page.plots.push(plot(&found, cloud.name, "brookshaw"));
-    }
+    page.plots = samples.iter().map(|sample| plot(&found, sample.cloud.name, "brookshaw")).collect();
     page.plots.push(plot(&found, FCC.name, "kernel"));
     say(&mut page, &found);
     Ok(page)
@@ -176,7 +176,7 @@ fn say(page: &mut Page, found: &[Moments]) {
         "sweet spots are the first dip of |K_d2 - 1| below a thousandth: more neighbours cost more; where there is \
          none, the smallest of all",
     );
-    for cloud in [JITTER_2D.name, JITTER_3D.name, GLASS.name] {
+    for cloud in [JITTER_2D, GLASS_2D, JITTER_3D, GLASS_3D].map(|cloud| cloud.name) {
         let of = found.iter().filter(|m| m.cloud == cloud && m.operator == "brookshaw");
         if let Some(least) = of.min_by(|a, b| a.first.total_cmp(&b.first)) {
             let Moments { kernel, h_fac, first, neighbours, .. } = least;
@@ -195,6 +195,7 @@ mod tests {
     /// K_d2 − 1 on fcc, derived independently: brookshaw, kernel, direct, and neighbours.
     #[test]
     fn moments_on_fcc_are_those_derived_elsewhere() {
+        let fcc = Sample::new(FCC, 4).unwrap();
         for (kernel, h_fac, expected, neighbours) in [
             ("M4", 1.0, [-3.4e-2, -1.3e-3, -1.1e-2], 42.0),
             ("M4", 1.35, [1.1e-2, 4.8e-3, -1.7e-2], 78.0),
@@ -203,7 +204,7 @@ mod tests {
             ("C2", 1.3, [-9.0e-3, -7.3e-3, 3.8e-2], 78.0),
         ] {
             for (operator, expected) in ["brookshaw", "kernel", "direct"].into_iter().zip(expected) {
-                let found = Moments::of(&FCC, 4, kernel, operator, h_fac).unwrap();
+                let found = Moments::of(&fcc, kernel, operator, h_fac).unwrap();
                 assert!((found.second / expected - 1.0).abs() < 0.05, "{found:?} {expected:e}");
                 assert!((found.neighbours - neighbours).abs() < 1.5 && found.first < 1e-12, "{found:?}");
             }

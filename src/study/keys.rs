@@ -15,6 +15,11 @@ pub static KEYS: &[(&str, &str, &str)] = &[
     ("particles", "jitter", "random displacement of every coordinate, at most this share of the spacing (default 0)"),
     ("particles", "seed", "of the displacements (default 1)"),
     (
+        "particles",
+        "glass",
+        "true: displaced particles (jitter = 0.5) that have pushed each other apart until they are evenly spaced without a lattice; in a periodic box (default false)",
+    ),
+    (
         "set",
         "QUANTITY",
         "a number; the name of an array of the file; T = \"exact\"; kappa = \"power n=2.5\" (list fields, laws)",

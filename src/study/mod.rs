@@ -3,7 +3,7 @@
 //! | file | what it holds |
 //! |---|---|
 //! | `exact` | exact solutions, by name |
-//! | `lattice` | particles on lattices |
+//! | `lattice`, `glass` | particles on lattices, and evenly spaced without one |
 //! | `surface` | particles at a free surface |
 //! | `keys` | every key of a scene file, what it means, what is wrong with it |
 //! | `scene` | the scene file |
@@ -11,16 +11,21 @@
 //! | `choose` | the particles that a mark is for |
 //! | `run` | the run and its snapshots |
 //! | `report` | accuracy against run time |
+//! | `norm` | the error that is meant |
+//! | `recommend` | what reaches an error cheapest on a host's particles |
 //! | `catalogue` | studies of the library itself, by name |
 //! | `kernels`, `convergence`, `work` | studies of accuracy |
+//! | `peers` | other codes, on the same particles in the same run |
 //! | `positivity` | of anisotropic operators |
 //! | `sod` | of a shock tube, with a small hydrodynamics of its own |
 //! | `claims` | of what others said |
 //! | `samples` | a computed field as a function of place |
-//! | `mode` | the scene that they share |
+//! | `mode`, `batch` | the scene that they share, and many cases side by side |
 //! | `page`, `table`, `plot` | what a study found, for people, browsers and programs |
 //! | `stability` | cases that break solvers |
 
+#[cfg(feature = "cli")]
+mod batch;
 #[cfg(feature = "cli")]
 pub mod catalogue;
 #[cfg(feature = "cli")]
@@ -30,6 +35,7 @@ pub mod claims;
 #[cfg(feature = "cli")]
 pub mod convergence;
 pub mod exact;
+pub mod glass;
 #[cfg(feature = "cli")]
 pub mod kernels;
 #[cfg(feature = "cli")]
@@ -37,12 +43,16 @@ pub mod keys;
 pub mod lattice;
 #[cfg(feature = "cli")]
 mod mode;
+pub mod norm;
 #[cfg(feature = "cli")]
 pub mod page;
+#[cfg(feature = "cli")]
+pub mod peers;
 #[cfg(feature = "cli")]
 pub mod plot;
 #[cfg(feature = "cli")]
 pub mod positivity;
+pub mod recommend;
 #[cfg(feature = "cli")]
 pub mod report;
 #[cfg(feature = "cli")]

@@ -69,14 +69,18 @@ impl Page {
         ))
     }
 
-    /// Every file with its content: the page, the same as JSON, a CSV for each table.
+    /// Every file with its content: the page, a CSV for each table, an SVG for each plot.
     ///
     /// # Errors
     /// As [`Page::html`].
     pub fn files(&self) -> Result<Vec<(String, String)>> {
         let tables = self.tables.iter().map(|t| (format!("{}-{}.csv", self.name, t.name), t.csv()));
-        let page = (format!("{}.html", self.name), self.html()?);
-        Ok(tables.chain([page]).collect())
+        let mut files: Vec<(String, String)> = tables.collect();
+        for (i, plot) in self.plots.iter().enumerate() {
+            files.push((format!("{}-{}.svg", self.name, i + 1), plot.file()?));
+        }
+        files.push((format!("{}.html", self.name), self.html()?));
+        Ok(files)
     }
 }
 
@@ -109,7 +113,7 @@ mod tests {
         assert!(html.contains("K &amp; co") && html.contains("M6 &lt; M4") && html.contains("<svg"), "{html}");
         assert!(html.contains("stopped before") && !html.contains("http"), "{html}");
         let names: Vec<String> = page.files().unwrap().into_iter().map(|f| f.0).collect();
-        assert_eq!(names, ["kernels-moments.csv", "kernels.html"]);
+        assert_eq!(names, ["kernels-moments.csv", "kernels-1.svg", "kernels.html"]);
         assert!(page.text().contains("moments: 1 rows"));
     }
 }

@@ -1,5 +1,6 @@
 //! What a run found and what it took: accuracy against run time. One struct, as text for people, as JSON for programs.
 
+use super::norm::l2;
 use crate::plan::{self, readable};
 use serde::Serialize;
 use std::fmt;
@@ -46,19 +47,12 @@ pub struct Accuracy {
 impl Accuracy {
     /// From pairs of T and exact. An exact solution that is the same everywhere is its own measure.
     pub fn new(solution: String, free: &[(f64, f64)]) -> Accuracy {
-        let n = free.len().max(1) as f64;
-        let mean = free.iter().map(|(_, exact)| exact).sum::<f64>() / n;
         let fold = |start: f64, of: fn(f64, f64) -> f64| free.iter().map(|(_, exact)| *exact).fold(start, of);
         let (low, high) = (fold(f64::INFINITY, f64::min), fold(f64::NEG_INFINITY, f64::max));
-        let (origin, range) = if high > low { (mean, high - low) } else { (0.0, mean.abs()) };
-        let squares = |of: &dyn Fn(f64, f64) -> f64| free.iter().map(|(t, exact)| of(*t, *exact).powi(2)).sum::<f64>();
-        let ratio = |error: f64, size: f64| if size > 0.0 { error / size } else { error };
-        Accuracy {
-            solution,
-            l2: ratio(squares(&|t, exact| t - exact), squares(&|_, exact| exact - origin)).sqrt(),
-            max: ratio(free.iter().map(|(t, exact)| (t - exact).abs()).fold(0.0, f64::max), range),
-            particles: free.len(),
-        }
+        let range = if high > low { high - low } else { high.abs() };
+        let largest = free.iter().map(|(t, exact)| (t - exact).abs()).fold(0.0, f64::max);
+        let max = if range > 0.0 { largest / range } else { largest };
+        Accuracy { solution, l2: l2(free), max, particles: free.len() }
     }
 }
 

@@ -11,10 +11,19 @@ use crate::model::fields;
 use crate::plan::Plan;
 use crate::solver::Solver;
 use std::path::{Path, PathBuf};
+use std::rc::Rc;
 use std::time::Instant;
 
 /// Inputs that let energy in or out.
 const DOORS: &[&str] = &["fixed", "source", "flux_in", "h_conv", "emissivity"];
+
+/// What T is held against.
+pub enum Known {
+    /// At a place and a time.
+    Solution(Exact),
+    /// Of each particle at the end, in the order of [`Study::places`].
+    Values(Rc<Vec<f64>>),
+}
 
 /// Called with the share that is done; false stops the run.
 pub type Watch = Box<dyn FnMut(f64) -> bool + Send>;
@@ -23,9 +32,9 @@ pub type Watch = Box<dyn FnMut(f64) -> bool + Send>;
 pub struct Study {
     scene: Scene,
     solver: Solver,
-    exact: Option<Exact>,
-    /// What the exact solution is called.
-    known: String,
+    known: Option<Known>,
+    /// What it is called.
+    source: String,
     setup_seconds: f64,
 }
 
@@ -37,8 +46,9 @@ impl Study {
     pub fn new(scene: Scene, folder: &Path) -> Result<Study> {
         let start = Instant::now();
         let (solver, exact) = setup(&scene, folder)?;
-        let known = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
-        Ok(Study { scene, solver, exact, known, setup_seconds: start.elapsed().as_secs_f64() })
+        let source = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
+        let known = exact.map(Known::Solution);
+        Ok(Study { scene, solver, known, source, setup_seconds: start.elapsed().as_secs_f64() })
     }
 
     /// What a step will do.
@@ -50,10 +60,21 @@ impl Study {
     }
 
     /// The same, held against a solution that the scene does not name.
-    pub fn against(mut self, name: &str, exact: Exact) -> Study {
-        self.known = name.to_string();
-        self.exact = Some(exact);
-        self
+    pub fn against(self, source: &str, known: Known) -> Study {
+        Study { source: source.into(), known: Some(known), ..self }
+    }
+
+    pub fn dim(&self) -> usize {
+        self.solver.dim()
+    }
+
+    /// Where the particles are; coordinates beyond dim are 0.
+    ///
+    /// # Errors
+    /// As [`Solver::get`].
+    pub fn places(&mut self) -> Result<Vec<[f64; 3]>> {
+        let place = |p: &[f64]| std::array::from_fn(|axis| p.get(axis).copied().unwrap_or(0.0));
+        Ok(self.solver.get_all("x")?.chunks(self.solver.dim()).map(place).collect())
     }
 
     /// Steps to the end, to what T is there as a function of place.
@@ -78,7 +99,7 @@ impl Study {
         let work = self.steps(writer.as_mut())?;
 
         let solver = &mut self.solver;
-        let accuracy = self.exact.as_ref().map(|exact| accuracy(&self.known, solver, exact)).transpose()?;
+        let accuracy = self.known.as_ref().map(|known| accuracy(&self.source, solver, known)).transpose()?;
         let (n, neighbours) = (solver.len() as f64, solver.get_number("mean_neighbours")?);
         let seconds = Seconds {
             setup: self.setup_seconds,
@@ -156,11 +177,15 @@ fn extrema(solver: &mut Solver) -> Result<Temperature> {
 }
 
 /// The error of T where T is not fixed.
-fn accuracy(solution: &str, solver: &mut Solver, exact: &Exact) -> Result<Accuracy> {
+fn accuracy(solution: &str, solver: &mut Solver, known: &Known) -> Result<Accuracy> {
     let (dim, time) = (solver.dim(), solver.get_number("time")?);
-    let known = at_all(exact, &solver.get_all("x")?, dim, time);
+    let known = match known {
+        Known::Solution(exact) => Rc::new(at_all(exact, &solver.get_all("x")?, dim, time)),
+        Known::Values(values) => Rc::clone(values),
+    };
     let (t, fixed) = (solver.get_all("T")?, solver.get_all("fixed")?);
-    let free = t.iter().zip(&known).zip(&fixed).filter(|(_, fixed)| **fixed == 0.0).map(|((t, known), _)| (*t, *known));
+    let free =
+        t.iter().zip(&*known).zip(&fixed).filter(|(_, fixed)| **fixed == 0.0).map(|((t, known), _)| (*t, *known));
     Ok(Accuracy::new(solution.to_string(), &free.collect::<Vec<_>>()))
 }
 

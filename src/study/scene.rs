@@ -3,9 +3,11 @@
 use super::keys::explain;
 use crate::error::{Error, Result};
 use crate::io::{Encoding, Options};
+use crate::words::replaced;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -57,6 +59,11 @@ pub struct Particles {
     pub jitter: f64,
     #[serde(default = "one")]
     pub seed: u64,
+    #[serde(default)]
+    pub glass: bool,
+    /// Coordinates that were made before, in place of the lattice.
+    #[serde(skip)]
+    pub made: Option<Arc<Vec<f64>>>,
 }
 
 /// What a quantity is set to.
@@ -208,14 +215,10 @@ impl Scene {
     /// # Errors
     /// `BadValue` unless it has the form `key=value`.
     pub fn set_word(&mut self, word: &str) -> Result<()> {
-        let Some((key, value)) = word.split_once('=').filter(|(k, v)| !k.is_empty() && !v.is_empty()) else {
+        if !word.split_once('=').is_some_and(|(key, value)| !key.is_empty() && !value.is_empty()) {
             return Err(Error::bad("--set", format!("'{word}'"), "write key=value, like kernel=M4"));
-        };
-        let other = |w: &&str| w.split_once('=').is_none_or(|(k, _)| k != key);
-        let mut words: Vec<&str> = self.words.split_whitespace().filter(other).collect();
-        let word = format!("{key}={value}");
-        words.push(&word);
-        self.words = words.join(" ");
+        }
+        self.words = replaced(&self.words, word, &[]);
         Ok(())
     }
 }

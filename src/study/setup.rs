@@ -2,7 +2,7 @@
 
 use super::exact::{self, Exact};
 use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
-use super::{choose, lattice, surface};
+use super::{choose, glass, lattice, surface};
 use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::io::{self, Snapshot};
@@ -86,21 +86,40 @@ impl Setup<'_> {
 
     fn particles(&mut self, folder: &Path) -> Result<()> {
         let dim = self.solver.dim();
-        let Particles { file, lattice: name, n, jitter, seed } = &self.scene.particles;
+        let Particles { file, lattice: name, n, jitter, seed, glass, made } = &self.scene.particles;
         if let Some(file) = file {
             let snapshot = io::read(folder.join(file))?;
             self.solver.set_snapshot(&snapshot)?;
             self.x = snapshot.points.iter().flat_map(|p| p[..dim].iter().copied()).collect();
             self.snapshot = Some(snapshot);
         } else if let (Some(name), Some(n), Some(space)) = (name, n, &self.scene.space) {
-            self.x = lattice::find(name, dim)?.fill(&space.lo, &space.hi, *n as usize)?;
             let volume: f64 = space.lo.iter().zip(&space.hi).map(|(lo, hi)| hi - lo).product();
-            let cell = volume * dim as f64 / self.x.len() as f64;
-            lattice::jitter(&mut self.x, jitter * cell.powf(1.0 / dim as f64), *seed);
+            let cell = |x: &[f64]| volume * dim as f64 / x.len() as f64;
+            self.x = match made {
+                Some(made) => made.to_vec(),
+                None => {
+                    let mut x = lattice::find(name, dim)?.fill(&space.lo, &space.hi, *n as usize)?;
+                    let spacing = cell(&x).powf(1.0 / dim as f64);
+                    lattice::jitter(&mut x, jitter * spacing, *seed);
+                    if *glass {
+                        self.needs_periodic("particles.glass")?;
+                        glass::relax(&mut x, &space.lo, &space.hi)?;
+                    }
+                    x
+                }
+            };
+            let cell = cell(&self.x);
             self.solver.set_particles(Strided::new("x", &self.x, self.x.len() / dim, dim, dim)?)?;
             self.cell = Some(cell);
         }
         Ok(())
+    }
+
+    fn needs_periodic(&self, what: &str) -> Result<()> {
+        match self.periodic().iter().all(|periodic| *periodic) {
+            true => Ok(()),
+            false => Err(Error::bad(what, true, "it needs a box that is periodic along every axis")),
+        }
     }
 
     fn find_exact(&self) -> Result<Option<Exact>> {
@@ -266,6 +285,14 @@ mod tests {
         // Away from the corners, the lowest and the highest row.
         assert_eq!(fixed("{ surface = true, x = [0.5, 1.5] }"), 20);
         assert_eq!(fixed("{ surface = false, x = [0.5, 1.5] }"), 80);
+    }
+
+    #[test]
+    fn a_glass_needs_a_periodic_box() {
+        let mut open = scene("");
+        open.particles.glass = true;
+        let text = setup(&open, Path::new(".")).err().unwrap().to_string();
+        assert!(text.contains("periodic along every axis"), "{text}");
     }
 
     #[test]

@@ -16,6 +16,7 @@ pub struct Host {
     pub values: Vec<f64>,
     pub out: Vec<f64>,
     pub value: f64,
+    pub seconds: f64,
     pub count: i64,
     pub text: [c_char; 256],
     pub why: [c_char; 256],
@@ -64,6 +65,7 @@ impl Host {
             values: (0..N).map(|i| 300.0 + (i * i % 7) as f64).collect(),
             out: vec![UNTOUCHED; 2 * N],
             value: UNTOUCHED,
+            seconds: UNTOUCHED,
             count: -777,
             text: [b'?' as c_char; 256],
             why: [0; 256],
@@ -96,7 +98,7 @@ impl Host {
 
     /// Whether every place for a result is as it was.
     pub fn is_untouched(&self) -> bool {
-        self.out.iter().chain([&self.value, &self.report.time]).all(|v| *v == UNTOUCHED)
+        self.out.iter().chain([&self.value, &self.seconds, &self.report.time]).all(|v| *v == UNTOUCHED)
             && self.count == -777
             && self.text.iter().all(|b| *b == b'?' as c_char)
             && self.made.is_null()
@@ -155,6 +157,7 @@ impl Host {
                 ("diffusph_limit", diffusph_limit(s, value)),
                 ("diffusph_rate", diffusph_rate(s, out, LEN, 1)),
                 ("diffusph_plan", diffusph_plan(s, buf, 4096, count)),
+                ("diffusph_recommend", diffusph_recommend(s, 0.5, 1e-3, buf, 4096, value, &mut self.seconds)),
                 ("diffusph_get", diffusph_get(s, c("flux"), out, LEN, 2)),
                 ("diffusph_get_number", diffusph_get_number(s, c("energy"), value)),
                 ("diffusph_seconds", diffusph_seconds(s, 0, buf, 64, value)),

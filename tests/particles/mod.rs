@@ -65,18 +65,9 @@ pub fn names(catalogue: &str) -> Vec<String> {
     diffusph::solver::catalogue::catalogue(catalogue).unwrap().into_iter().map(|item| item.name).collect()
 }
 
-/// A glass: jittered particles in the periodic unit box that have pushed each other apart until they are evenly spaced
-/// without a lattice.
+/// A glass in the periodic unit box.
 pub fn glass(n: usize, dim: usize) -> Vec<f64> {
-    const PUSHES: usize = 300;
     let mut x = lattice(n, dim, 0.5);
-    let reach = 2.4 / n as f64;
-    for _ in 0..PUSHES {
-        let mut s = unit_box("kernel=M4", &x, dim, true);
-        s.set_number("h", 0.5 * reach).unwrap();
-        // The first moment of positive weights points to where neighbours crowd.
-        let crowd = s.get_all("first_moment").unwrap();
-        x.iter_mut().zip(crowd).for_each(|(x, c)| *x = (*x - 0.012 / n as f64 * c).rem_euclid(1.0));
-    }
+    diffusph::study::glass::relax(&mut x, &[0.0; 3][..dim], &[1.0; 3][..dim]).unwrap();
     x
 }

@@ -167,8 +167,9 @@ fn pairs(near: &Neighbours) -> Table {
 fn map(near: &Neighbours) -> Plot {
     let title = "Grey: the inequality fails for kappa_xx = 1, kappa_yy = 0 (M6 on a square lattice)";
     let mut plot = Plot::new(title, Axis::linear("x/h"), Axis::linear("y/h"));
+    plot.map = true;
     let edge = (PI / 2.0) * (1.0 - negative_share(2, 0.0));
-    for (name, middle) in [("fails", PI / 2.0), ("fails below", -PI / 2.0)] {
+    for (name, middle) in [("inequality fails", PI / 2.0), ("", -PI / 2.0)] {
         let rim = (0..=40).map(|i| middle + (PI / 2.0 - edge) * (f64::from(i) / 20.0 - 1.0));
         let rim = rim.map(|a| (near.radius * a.cos(), near.radius * a.sin()));
         plot.add(name, Style::Area, std::iter::once((0.0, 0.0)).chain(rim).collect());

@@ -3,12 +3,14 @@
 pub mod riemann;
 mod tube;
 
+use super::batch;
 use super::catalogue::Request;
 use super::kernels::Moments;
-use super::mode::LINE;
+use super::mode::{FCC, LINE, Sample};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
-use super::table::{Table, column, short};
+use super::recommend::refused;
+use super::table::{Cell, Table, column, short};
 use crate::error::Result;
 use crate::kernel;
 use riemann::{Gas, Riemann};
@@ -18,63 +20,88 @@ pub const LEFT: Gas = Gas { rho: 1.0, v: 0.0, p: 1.0 };
 pub const RIGHT: Gas = Gas { rho: 0.125, v: 0.0, p: 0.1 };
 const END: f64 = 0.2;
 
+pub const GAMMAS: [f64; 2] = [1.4, 5.0 / 3.0];
+
 /// One tube.
 #[derive(Debug, Clone)]
 pub struct Shock {
+    pub dim: usize,
     pub gamma: f64,
     pub kernel: &'static str,
     pub h_fac: f64,
-    /// Of the density: sqrt(Σ (rho − exact)² / Σ exact²) over particles.
+    /// Of the density: sqrt(Σ (rho − exact)² / Σ exact²) over particles; no number where the gas fell apart.
     pub l2: f64,
-    /// K_d2 − 1 of brookshaw on a line of particles.
+    /// K_d2 − 1 of brookshaw on the lattice of the gas at rest.
     pub second: f64,
 }
 
 impl Shock {
-    /// With `n` particles on the left.
+    /// With `n` cells of the lattice along the dense half.
     ///
     /// # Errors
     /// As [`Tube::new`].
-    pub fn of(kernel: &'static str, h_fac: f64, gamma: f64, n: usize) -> Result<Shock> {
-        let mut tube = Tube::new(kernel, h_fac, gamma, n, [LEFT, RIGHT])?;
-        tube.run(END);
-        let exact = Riemann::new(gamma, LEFT, RIGHT);
-        let (mut error, mut size) = (0.0, 0.0);
-        for (x, rho) in tube.densities_at() {
-            let known = exact.density(x / END);
-            error += (rho - known).powi(2);
-            size += known * known;
-        }
-        let second = Moments::of(&LINE, 8, kernel, "brookshaw", h_fac)?.second;
-        Ok(Shock { gamma, kernel, h_fac, l2: (error / size).sqrt(), second })
+    pub fn of(dim: usize, kernel: &'static str, h_fac: f64, gamma: f64, n: usize) -> Result<Shock> {
+        let mut tube = Tube::new(kernel, dim, h_fac, gamma, n, [LEFT, RIGHT])?;
+        let l2 = match tube.run(END) {
+            Ok(()) => error(&tube, &Riemann::new(gamma, LEFT, RIGHT)),
+            Err(e) if refused(&e) => f64::NAN,
+            Err(e) => return Err(e),
+        };
+        let (lattice, cells) = if dim == 1 { (LINE, 8) } else { (FCC, 4) };
+        let second = Moments::of(&Sample::new(lattice, cells)?, kernel, "brookshaw", h_fac)?.second;
+        Ok(Shock { dim, gamma, kernel, h_fac, l2, second })
     }
+}
+
+fn error(tube: &Tube, exact: &Riemann) -> f64 {
+    let terms = tube.densities().map(|(x, rho)| (rho, exact.density(x / END)));
+    let [error, size] = terms.fold([0.0; 2], |[e, s], (rho, known)| [e + (rho - known).powi(2), s + known * known]);
+    (error / size).sqrt()
+}
+
+/// Tubes that are asked for by kernel, h_fac and gamma, as far as `goes_on` lets them.
+///
+/// # Errors
+/// As [`Shock::of`].
+pub fn tubes(
+    dim: usize,
+    n: usize,
+    cases: &[(&'static str, f64, f64)],
+    goes_on: impl FnMut(usize) -> bool,
+) -> Result<Vec<Shock>> {
+    batch::map(cases, |(kernel, h_fac, gamma)| Shock::of(dim, kernel, *h_fac, *gamma, n), goes_on)
+}
+
+fn h_facs(last: f64, steps: u32) -> impl Iterator<Item = f64> + Clone {
+    (0..=steps).map(move |i| 0.8 + (last - 0.8) * f64::from(i) / f64::from(steps))
 }
 
 /// # Errors
 /// As [`Shock::of`].
 pub fn run(mut request: Request) -> Result<Page> {
-    let mut page = Page::new("sod", "Shock tube in 1-D: density error against h_fac for every kernel");
-    let (n, steps) = request.pick((40, 2), (120, 8), (400, 24));
-    let h_facs: Vec<f64> = (0..=steps).map(|i| 0.8 + 1.2 * f64::from(i) / f64::from(steps)).collect();
-    let mut cases = Vec::new();
-    for gamma in [1.4, 5.0 / 3.0] {
-        for (kernel, _) in kernel::catalogue() {
-            cases.extend(h_facs.iter().map(|h_fac| (kernel, *h_fac, gamma)));
+    let mut page = Page::new("sod", "Shock tube: density error against h_fac for every kernel, in 1-D and 3-D");
+    let (line, steps) = request.pick((16, 2), (60, 6), (400, 24));
+    let (space, few) = request.pick((2, 1), (5, 3), (24, 12));
+    // In 3-D supports of twice the default reach a thousand neighbours.
+    let h_facs_in = [h_facs(2.0, steps), h_facs(1.4, few)].map(|h| h.collect::<Vec<_>>());
+    let sets = [(1, line), (3, space)].into_iter().zip(h_facs_in);
+    let mut found: Vec<Shock> = Vec::new();
+    for (part, ((dim, n), h_facs)) in sets.enumerate() {
+        let mut cases = Vec::new();
+        // In 3-D one gamma must do where time is short.
+        for gamma in GAMMAS.into_iter().take(if dim == 3 && !request.full { 1 } else { GAMMAS.len() }) {
+            cases.extend(kernel::catalogue().flat_map(|(k, _)| h_facs.iter().map(move |h| (k, *h, gamma))));
         }
-    }
-    let mut found = Vec::new();
-    for (done, (kernel, h_fac, gamma)) in cases.iter().enumerate() {
-        if !request.goes_on(done, cases.len()) {
-            page.complete = false;
-            break;
-        }
-        found.push(Shock::of(kernel, *h_fac, *gamma, n)?);
+        let all = cases.len();
+        let some = tubes(dim, n, &cases, |done| request.goes_on(part * all + done, 2 * all))?;
+        page.complete &= some.len() == all;
+        found.extend(some);
+        page.find(format!("{dim}-D: {n} cells of the lattice along each half of the dense gas"));
     }
     page.tables = vec![best(&found), table(&found)];
-    page.plots = [1.4, 5.0 / 3.0].map(|gamma| plot(&found, gamma)).into();
-    page.find(format!("{n} particles on the left and {} on the right; in 3-D it is not there yet", n / 8));
+    page.plots = found.chunk_by(|a, b| (a.dim, a.gamma) == (b.dim, b.gamma)).map(plot).collect();
     let lost = found.iter().filter(|s| !s.l2.is_finite());
-    let lost: Vec<String> = lost.map(|s| format!("{} at {:.2}", s.kernel, s.h_fac)).collect();
+    let lost: Vec<String> = lost.map(|s| format!("{} at {:.2} in {}-D", s.kernel, s.h_fac, s.dim)).collect();
     if !lost.is_empty() {
         page.find(format!("no numbers in the end, for want of neighbours: {}", lost.join(", ")));
     }
@@ -83,14 +110,15 @@ pub fn run(mut request: Request) -> Result<Page> {
 }
 
 fn curves(found: &[Shock]) -> impl Iterator<Item = &[Shock]> {
-    found.chunk_by(|a, b| (a.gamma, a.kernel) == (b.gamma, b.kernel))
+    found.chunk_by(|a, b| (a.dim, a.gamma, a.kernel) == (b.dim, b.gamma, b.kernel))
 }
 
 fn table(found: &[Shock]) -> Table {
-    let names = ["gamma", "kernel", "h_fac", "l2", "K_d2 - 1"].map(|name| column(name, ""));
+    let names = ["dim", "gamma", "kernel", "h_fac", "l2", "K_d2 - 1"].map(|name| column(name, ""));
     let mut table = Table::long("errors", &names);
-    for Shock { gamma, kernel, h_fac, l2, second } in found {
-        table.push([(*gamma).into(), (*kernel).into(), (*h_fac).into(), (*l2).into(), (*second).into()]);
+    for Shock { dim, gamma, kernel, h_fac, l2, second } in found {
+        let [gamma, h_fac, l2, second] = [gamma, h_fac, l2, second].map(|v| Cell::Number(*v));
+        table.push([(*dim).into(), gamma, (*kernel).into(), h_fac, l2, second]);
     }
     table
 }
@@ -98,6 +126,7 @@ fn table(found: &[Shock]) -> Table {
 fn best(found: &[Shock]) -> Table {
     let names = [
         "kernel",
+        "dim",
         "gamma",
         "best h_fac",
         "l2",
@@ -114,6 +143,7 @@ fn best(found: &[Shock]) -> Table {
         if let (Some(best), Some(worst)) = (known().min_by(by), known().max_by(by)) {
             table.push([
                 best.kernel.into(),
+                best.dim.into(),
                 best.gamma.into(),
                 best.h_fac.into(),
                 best.l2.into(),
@@ -127,11 +157,12 @@ fn best(found: &[Shock]) -> Table {
     table
 }
 
-fn plot(found: &[Shock], gamma: f64) -> Plot {
-    let title = format!("l2 error of the density, gamma = {gamma:.3}");
-    let mut plot = Plot::new(title, Axis::linear("h_fac"), Axis::log("l2 error"));
+/// Tubes of one dimension and gamma.
+fn plot(found: &[Shock]) -> Plot {
+    let title = format!("l2 error of the density in {}-D, gamma = {:.3}", found[0].dim, found[0].gamma);
+    let mut plot = Plot::new(title, Axis::linear("h_fac"), Axis::log("relative l2 error of rho"));
     let shown = ["M4", "M5", "M6", "M8", "C2", "C4", "C6"];
-    for curve in curves(found).filter(|c| c[0].gamma == gamma && shown.contains(&c[0].kernel)) {
+    for curve in curves(found).filter(|c| shown.contains(&c[0].kernel)) {
         plot.add(curve[0].kernel, Style::Line, curve.iter().map(|s| (s.h_fac, s.l2)).collect());
     }
     plot
@@ -163,14 +194,14 @@ fn moment(x: &[f64], y: &[f64]) -> f64 {
 }
 
 fn say(page: &mut Page, found: &[Shock]) {
-    for gamma in [1.4, 5.0 / 3.0] {
+    for (dim, gamma) in [1, 3].into_iter().flat_map(|dim| GAMMAS.map(|gamma| (dim, gamma))) {
         let of = |kernel: &str, h: f64| {
-            let near = found.iter().filter(|s| s.gamma == gamma && s.kernel == kernel);
-            near.min_by(|a, b| (a.h_fac - h).abs().total_cmp(&(b.h_fac - h).abs()))
+            let own = found.iter().filter(|s| (s.dim, s.gamma) == (dim, gamma) && s.kernel == kernel);
+            own.min_by(|a, b| (a.h_fac - h).abs().total_cmp(&(b.h_fac - h).abs()))
         };
         if let (Some(m6), Some(m4)) = (of("M6", 0.9), of("M4", 1.35)) {
             page.find(format!(
-                "gamma {gamma:.3}: M6 at {:.2} has {} and M4 at {:.2} has {}, at the same cost",
+                "{dim}-D, gamma {gamma:.3}: M6 at {:.2} has {} and M4 at {:.2} has {}, at the same cost",
                 m6.h_fac,
                 short(m6.l2),
                 m4.h_fac,
@@ -186,7 +217,9 @@ mod tests {
 
     #[test]
     fn a_shock_tube_is_better_with_more_particles() {
-        let [few, many] = [60, 120].map(|n| Shock::of("M6", 1.0, 1.4, n).unwrap().l2);
-        assert!(many < 0.8 * few && many < 0.05, "{few} {many}");
+        for (dim, sizes, most) in [(1, [60, 120], 0.05), (3, [4, 8], 0.15)] {
+            let [few, many] = sizes.map(|n| Shock::of(dim, "M6", 1.0, 1.4, n).unwrap().l2);
+            assert!(many < 0.8 * few && many < most, "{dim}-D: {few} {many}");
+        }
     }
 }

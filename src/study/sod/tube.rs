@@ -1,27 +1,39 @@
-//! The shock tube with standard SPH in 1-D (Price 2012, Price et al. 2018): h and rho found together, grad-h terms,
-//! Monaghan's viscosity with alpha = 1 and beta = 2, conductivity with v_sig = sqrt(|P_a − P_b|/rho).
+//! The shock tube with standard SPH in 1 or 3 dimensions (Price 2012, Price et al. 2018): h and rho found together, grad-h
+//! terms, Monaghan's viscosity with alpha = 1 and beta = 2, conductivity with v_sig = sqrt(|P_a − P_b|/rho).
+//!
+//! The box is periodic: the dense gas lies within 1/2 of the origin and the thin one beyond, so that there are two tubes,
+//! each the other's mirror image, and no ends. In 3-D both gases are closest packings and the box is [`ACROSS`] dense cells
+//! wide, which is one thin cell.
 
 use super::riemann::Gas;
+use crate::array::Strided;
 use crate::error::Result;
 use crate::kernel::Kernel;
+use crate::pool::Pool;
+use crate::space::rows::Rows;
+use crate::space::{Cloud, Domain, Row, Scratch, density};
+use crate::study::lattice;
 
 const ALPHA: f64 = 1.0;
 const BETA: f64 = 2.0;
 const CONDUCT: f64 = 1.0;
 /// Of the Courant time h/v_sig.
 const COURANT: f64 = 0.3;
+/// Dense cells across the tube.
+const ACROSS: f64 = 2.0;
 
 pub struct Tube {
     kernel: Kernel,
     h_fac: f64,
     gamma: f64,
     m: f64,
-    /// Particles that move; the others hold the ends.
-    free: std::ops::Range<usize>,
-    pub x: Vec<f64>,
+    domain: Domain,
+    pool: Pool,
+    /// dim coordinates per particle.
+    x: Vec<f64>,
     v: Vec<f64>,
     u: Vec<f64>,
-    pub rho: Vec<f64>,
+    rho: Vec<f64>,
     h: Vec<f64>,
     omega: Vec<f64>,
 }
@@ -29,88 +41,93 @@ pub struct Tube {
 /// Rates of v and u.
 type Rates = (Vec<f64>, Vec<f64>);
 
-/// Buffers for a row of neighbours.
+/// Kernel slopes of a row, with the smoothing length of its particle and with those of its neighbours.
 #[derive(Default)]
-struct Row {
+struct Slopes {
     q: Vec<f64>,
-    w: Vec<f64>,
-    slope: Vec<f64>,
+    own: Vec<f64>,
+    theirs: Vec<f64>,
 }
 
 impl Tube {
-    /// `n` particles from −0.5 to 0 on the left; all have the same mass.
+    /// `n` cells of the lattice along each half of the dense gas; all particles have the same mass.
     ///
     /// # Errors
     /// As [`Kernel::new`].
-    pub fn new(kernel: &str, h_fac: f64, gamma: f64, n: usize, [left, right]: [Gas; 2]) -> Result<Tube> {
-        let kernel = Kernel::new(kernel, 1)?;
-        let fine = 0.5 / n as f64;
-        let coarse = fine * left.rho / right.rho;
-        // Enough beyond the ends that free particles have whole supports.
-        let spare = (kernel.radius() * h_fac * 1.5).ceil() as usize + 2;
-        let m = left.rho * fine;
-        let (inside, outside) = (n, (0.5 / coarse) as usize);
-        let x: Vec<f64> = (0..n + spare)
-            .rev()
-            .map(|i| -fine * (i as f64 + 0.5))
-            .chain((0..outside + spare).map(|i| coarse * (i as f64 + 0.5)))
-            .collect();
+    pub fn new(kernel: &str, dim: usize, h_fac: f64, gamma: f64, n: usize, [dense, thin]: [Gas; 2]) -> Result<Tube> {
+        let kernel = Kernel::new(kernel, dim)?;
+        let width = ACROSS * 0.5 / n as f64;
+        let fill = |from: f64, cells: f64| {
+            let (lo, hi) = ([from, 0.0, 0.0], [from + 1.0, width, width]);
+            lattice::find(if dim == 1 { "cubic" } else { "fcc" }, dim)?.fill(
+                &lo[..dim],
+                &hi[..dim],
+                cells.round() as usize,
+            )
+        };
+        let mut x = fill(-0.5, 2.0 * n as f64)?;
+        let (dense_count, apart) = (x.len() / dim, (dense.rho / thin.rho).powf(1.0 / dim as f64));
+        x.extend(fill(0.5, 2.0 * n as f64 / apart)?);
+        let domain = Domain::new(&[-0.5, 0.0, 0.0][..dim], &[1.5, width, width][..dim], &[true; 3][..dim])?;
+        let m = dense.rho * width.powi(dim as i32 - 1) / dense_count as f64;
+        let count = x.len() / dim;
         let of =
-            |f: &dyn Fn(&Gas) -> f64| x.iter().map(|x| f(if *x < 0.0 { &left } else { &right })).collect::<Vec<_>>();
-        let (rho, v) = (of(&|g| g.rho), of(&|g| g.v));
-        let u = of(&|g| g.p / ((gamma - 1.0) * g.rho));
-        let h = rho.iter().map(|rho| h_fac * m / rho).collect();
-        let (free, omega) = (spare..spare + inside + outside, vec![1.0; x.len()]);
-        let mut tube = Tube { kernel, h_fac, gamma, m, free, x, v, u, rho, h, omega };
-        // From sharp densities to those of the sum.
-        (0..10).for_each(|_| tube.densities());
-        Ok(tube)
+            |f: &dyn Fn(&Gas) -> f64| (0..count).map(|i| f(if i < dense_count { &dense } else { &thin })).collect();
+        let (rho, u): (Vec<f64>, Vec<f64>) = (of(&|g| g.rho), of(&|g| g.p / ((gamma - 1.0) * g.rho)));
+        let h = rho.iter().map(|rho| h_fac * (m / rho).powf(1.0 / dim as f64)).collect();
+        let (v, omega, pool) = (vec![0.0; x.len()], vec![1.0; count], Pool::new(1)?);
+        Ok(Tube { kernel, h_fac, gamma, m, domain, pool, x, v, u, rho, h, omega })
     }
 
-    /// Where the particles that move are, and how dense it is there.
-    pub fn densities_at(&self) -> impl Iterator<Item = (f64, f64)> {
-        self.free.clone().map(|i| (self.x[i], self.rho[i]))
+    /// How far each particle is beyond the edge of the dense gas, and how dense it is there.
+    pub fn densities(&self) -> impl Iterator<Item = (f64, f64)> {
+        let along = self.x.iter().step_by(self.domain.dim);
+        let beyond = along.map(|x| {
+            let x = self.domain.wrap(0, *x);
+            (if x < 1.0 { x } else { x - 2.0 }).abs() - 0.5
+        });
+        beyond.zip(self.rho.iter().copied())
     }
 
-    /// Σ m (v²/2 + u) of all particles.
+    /// Σ m (v²/2 + u).
     #[cfg(test)]
     fn energy(&self) -> f64 {
-        self.v.iter().zip(&self.u).map(|(v, u)| self.m * (0.5 * v * v + u)).sum()
+        self.m * (0.5 * self.v.iter().map(|v| v * v).sum::<f64>() + self.u.iter().sum::<f64>())
     }
 
-    /// Heun's steps to `end`, or to where numbers end: a support of hardly two neighbours does not hold a gas together.
-    pub fn run(&mut self, end: f64) {
+    /// Heun's steps to `end`.
+    ///
+    /// # Errors
+    /// `BadElement` where numbers end: a support of hardly two neighbours does not hold a gas together. `BoxTooSmall`.
+    pub fn run(&mut self, end: f64) -> Result<()> {
         let mut t = 0.0;
-        while t < end && self.u.iter().all(|u| u.is_finite()) {
+        let mut rates = self.rates()?;
+        while t < end {
             let dt = self.limit().min(end - t);
-            self.step(dt);
+            rates = self.step(dt, rates)?;
             t += dt;
         }
+        Ok(())
     }
 
     fn limit(&self) -> f64 {
         let fastest = self.v.iter().map(|v| v.abs()).fold(0.0, f64::max);
-        let times = self.free.clone().map(|i| self.h[i] / (self.sound(i) * (1.0 + ALPHA) + BETA * fastest));
+        let times = (0..self.u.len()).map(|i| self.h[i] / (self.sound(i) * (1.0 + ALPHA) + BETA * fastest));
         COURANT * times.fold(f64::INFINITY, f64::min)
     }
 
-    fn step(&mut self, dt: f64) {
-        let old = (self.x.clone(), self.v.clone(), self.u.clone());
-        let (dv, du) = self.rates();
-        let dx = self.v.clone();
-        for i in self.free.clone() {
-            self.x[i] += dt * dx[i];
-            self.v[i] += dt * dv[i];
-            self.u[i] += dt * du[i];
-        }
-        self.densities();
-        let (dv2, du2) = self.rates();
-        for i in self.free.clone() {
-            self.x[i] = old.0[i] + 0.5 * dt * (dx[i] + self.v[i]);
-            self.v[i] = old.1[i] + 0.5 * dt * (dv[i] + dv2[i]);
-            self.u[i] = old.2[i] + 0.5 * dt * (du[i] + du2[i]);
-        }
-        self.densities();
+    /// From the rates at its start to those at its end.
+    fn step(&mut self, dt: f64, (dv, du): Rates) -> Result<Rates> {
+        let (x, v, u, dx) = (self.x.clone(), self.v.clone(), self.u.clone(), self.v.clone());
+        add(&mut self.x, dt, &dx);
+        add(&mut self.v, dt, &dv);
+        add(&mut self.u, dt, &du);
+        let (dv2, du2) = self.rates()?;
+        let mean = |old: &[f64], first: &[f64], second: &[f64]| -> Vec<f64> {
+            old.iter().zip(first.iter().zip(second)).map(|(old, (a, b))| old + 0.5 * dt * (a + b)).collect()
+        };
+        (self.x, self.v, self.u) = (mean(&x, &dx, &self.v), mean(&v, &dv, &dv2), mean(&u, &du, &du2));
+        self.rates()
     }
 
     fn sound(&self, i: usize) -> f64 {
@@ -121,72 +138,71 @@ impl Tube {
         (self.gamma - 1.0) * self.rho[i] * self.u[i]
     }
 
-    /// Particles within the support of `a`: in 1-D they stay in order.
-    fn reach(&self, a: usize) -> std::ops::Range<usize> {
-        let near = |b: &usize| (self.x[*b] - self.x[a]).abs() < self.kernel.radius() * self.h[a];
-        let first = (0..a).rev().take_while(near).last().unwrap_or(a);
-        let last = (a + 1..self.x.len()).take_while(near).last().unwrap_or(a);
-        first..last + 1
-    }
-
-    fn row(&self, a: usize, near: std::ops::Range<usize>, row: &mut Row) {
-        row.q.clear();
-        row.q.extend(near.map(|b| (self.x[b] - self.x[a]).abs() / self.h[a]));
-        row.w.resize(row.q.len(), 0.0);
-        row.slope.resize(row.q.len(), 0.0);
-        self.kernel.w(&row.q, &mut row.w);
-        self.kernel.slope_over_q(&row.q, &mut row.slope);
-    }
-
-    /// rho = Σ m W(h) with h = h_fac m/rho, by Newton's method from where they were; Omega on the way.
-    fn densities(&mut self) {
-        let mut row = Row::default();
-        for a in self.free.clone() {
-            for _ in 0..20 {
-                self.row(a, self.reach(a), &mut row);
-                let h = self.h[a];
-                let sum: f64 = self.m * row.w.iter().sum::<f64>() / h;
-                // h dW/dh = −(f + q f')/h
-                let change: f64 = row.w.iter().zip(&row.q).zip(&row.slope).map(|((w, q), s)| w + q * q * s).sum();
-                self.omega[a] = 1.0 - self.m * change / (h * sum);
-                self.rho[a] = sum;
-                let wanted = self.h_fac * self.m / sum;
-                let next = h + (wanted - h) / self.omega[a].max(0.2);
-                self.h[a] = next.max(0.5 * h).min(2.0 * h);
-                if (self.h[a] / h - 1.0).abs() < 1e-8 {
-                    break;
-                }
-            }
+    /// Finds rho, h and Omega where the particles are, and what moves and heats them there.
+    fn rates(&mut self) -> Result<Rates> {
+        let (dim, count) = (self.domain.dim, self.u.len());
+        let widest = self.kernel.radius() * self.h.iter().copied().fold(0.0, f64::max);
+        let cloud = Cloud::sort(&self.domain, Strided::new("x", &self.x, count, dim, dim)?, widest, &self.pool)?;
+        let mass = vec![self.m; count];
+        let start = cloud.inward("h", Strided::packed(&self.h), 0)?;
+        let h = density::smoothing_lengths(&self.kernel, self.h_fac, &cloud, &mass, start, &self.pool)?;
+        let rows = Rows::new(&cloud, &h, self.kernel.radius(), &self.pool)?;
+        let omega = density::omega(&self.kernel, &rows, &mass, &self.pool)?;
+        for (i, &host) in cloud.host.iter().enumerate() {
+            let host = host as usize;
+            (self.h[host], self.omega[host]) = (h[i], omega[i]);
+            self.rho[host] = self.m * (self.h_fac / h[i]).powi(dim as i32);
         }
+        let (mut dv, mut du) = (vec![0.0; self.v.len()], vec![0.0; count]);
+        let mut slopes = Slopes::default();
+        rows.visit(0..count, &mut Scratch::default(), |row| {
+            let a = cloud.host[row.i] as usize;
+            du[a] = self.pull(a, &row, &cloud.host, &mut slopes, &mut dv[a * dim..][..dim]);
+        })?;
+        Ok((dv, du))
     }
 
-    /// Each support's half of an exchange, in equal and opposite parts.
-    fn rates(&self) -> Rates {
-        let (mut dv, mut du) = (vec![0.0; self.x.len()], vec![0.0; self.x.len()]);
-        let mut row = Row::default();
-        for a in 0..self.x.len() {
-            let near = self.reach(a);
-            self.row(a, near.clone(), &mut row);
-            for (b, (q, slope)) in near.zip(row.q.iter().zip(&row.slope)).filter(|(b, _)| *b != a) {
-                // From a to b, r̂ = ±1; F = dW/dr < 0.
-                let side = (self.x[b] - self.x[a]).signum();
-                let f = slope * q / (self.h[a] * self.h[a]) / self.omega[a];
-                let closing = ((self.v[a] - self.v[b]) * side).max(0.0);
-                let shock = 0.5 * self.rho[a] * (ALPHA * self.sound(a) + BETA * closing) * closing;
-                let push = self.m * (self.pressure(a) + shock) / (self.rho[a] * self.rho[a]) * f * side;
-                dv[a] += push;
-                dv[b] -= push;
-                // The work of both ends: energy is kept to the integrator's error.
-                du[a] -= push * (self.v[a] - self.v[b]);
-                let mean = 0.5 * (self.rho[a] + self.rho[b]);
-                let signal = ((self.pressure(a) - self.pressure(b)).abs() / mean).sqrt();
-                let heat = self.m * CONDUCT * signal * (self.u[a] - self.u[b]) * 0.5 * f / self.rho[a];
-                du[a] += heat;
-                du[b] -= heat;
-            }
+    /// dv/dt and du/dt of a particle from its neighbours. What two do to each other is equal and opposite.
+    fn pull(&self, a: usize, row: &Row, host: &[u32], slopes: &mut Slopes, dv: &mut [f64]) -> f64 {
+        let dim = dv.len();
+        let Slopes { q, own, theirs } = slopes;
+        let mut of = |h: &dyn Fn(usize) -> f64, slope: &mut Vec<f64>| {
+            q.clear();
+            q.extend(row.r.iter().enumerate().map(|(k, r)| r / h(k)));
+            slope.resize(q.len(), 0.0);
+            self.kernel.slope_over_q(q, slope);
+            // dW/dr with the grad-h term.
+            slope.iter_mut().enumerate().for_each(|(k, s)| *s *= q[k] / h(k).powi(dim as i32 + 1));
+        };
+        let neighbour = |k: usize| host[row.j[k] as usize] as usize;
+        of(&|_| self.h[a], own);
+        of(&|k| self.h[neighbour(k)], theirs);
+        let mut du = 0.0;
+        for k in 0..row.len() {
+            let (b, to) = (neighbour(k), row.direction(k));
+            let (fa, fb) = (own[k] / self.omega[a], theirs[k] / self.omega[b]);
+            let velocity = |i: usize| (0..dim).map(|axis| self.v[i * dim + axis] * to[axis]).sum::<f64>();
+            let closing = velocity(a) - velocity(b);
+            // P/rho² and the viscosity's share of it.
+            let push = |i: usize| {
+                let c = closing.max(0.0);
+                let shock = 0.5 * self.rho[i] * (ALPHA * self.sound(i) + BETA * c) * c;
+                (self.pressure(i) + shock) / (self.rho[i] * self.rho[i])
+            };
+            let (pa, pb) = (push(a) * fa, push(b) * fb);
+            dv.iter_mut().zip(to).for_each(|(dv, to)| *dv += self.m * (pa + pb) * to);
+            du -= self.m * pa * closing;
+            let mean = 0.5 * (self.rho[a] + self.rho[b]);
+            let signal = ((self.pressure(a) - self.pressure(b)).abs() / mean).sqrt();
+            let slope = 0.5 * (fa / self.rho[a] + fb / self.rho[b]);
+            du += self.m * CONDUCT * signal * (self.u[a] - self.u[b]) * slope;
         }
-        (dv, du)
+        du
     }
+}
+
+fn add(values: &mut [f64], dt: f64, rates: &[f64]) {
+    values.iter_mut().zip(rates).for_each(|(v, rate)| *v += dt * rate);
 }
 
 #[cfg(test)]
@@ -196,14 +212,20 @@ mod tests {
 
     #[test]
     fn a_uniform_gas_stays_as_it_is_and_a_tube_keeps_its_energy() {
-        let mut still = Tube::new("M6", 1.0, 1.4, 40, [LEFT, LEFT]).unwrap();
-        still.run(0.05);
-        assert!(
-            still.v.iter().all(|v| v.abs() < 1e-10) && still.densities_at().all(|(_, rho)| (rho - 1.0).abs() < 1e-3)
-        );
-        let mut tube = Tube::new("M4", 1.2, 1.4, 80, [LEFT, RIGHT]).unwrap();
-        let before = tube.energy();
-        tube.run(0.1);
-        assert!((tube.energy() / before - 1.0).abs() < 1e-3, "{before} {}", tube.energy());
+        for (dim, n) in [(1, 40), (3, 4)] {
+            let mut still = Tube::new("M6", dim, 1.0, 1.4, n, [LEFT, LEFT]).unwrap();
+            still.run(0.05).unwrap();
+            // A lattice is in equilibrium by symmetry; its density sum is off by its own quadrature error.
+            let off = still.densities().map(|(_, rho)| (rho - 1.0).abs()).fold(0.0, f64::max);
+            assert!(still.v.iter().all(|v| v.abs() < 1e-10) && off < 3e-3, "{dim}-D: {off}");
+            let mut tube = Tube::new("M4", dim, 1.2, 1.4, 2 * n, [LEFT, RIGHT]).unwrap();
+            let before = tube.energy();
+            tube.run(0.1).unwrap();
+            // Heun's error.
+            assert!((tube.energy() / before - 1.0).abs() < 1e-3, "{dim}-D: {before} {}", tube.energy());
+            let momentum: f64 = tube.v.iter().step_by(dim).sum::<f64>() * tube.m;
+            // Sums of equal and opposite terms.
+            assert!(momentum.abs() < 1e-10, "{dim}-D: {momentum:e}");
+        }
     }
 }

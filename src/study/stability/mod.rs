@@ -33,7 +33,7 @@ mod trial;
 
 use super::catalogue::{Answer, Request};
 use super::run::Watch;
-use crate::error::{Error, Result};
+use crate::error::Result;
 pub use seen::Seen;
 pub use setting::Setting;
 pub use table::{Row, Verdict};
@@ -72,21 +72,19 @@ pub fn cases() -> Vec<&'static Case> {
     all
 }
 
-/// Tries every case with all its words. `scale` multiplies the number of particles along each axis.
-///
-/// # Errors
-/// `Cancelled` when `watch` says so. That a case fails is not an error but a row.
-pub fn run(cases: &[&Case], scale: usize, mut watch: Watch) -> Result<Vec<Row>> {
+/// Tries every case with all its words, until `watch` says no; whether it came to the end is the second answer. `scale`
+/// multiplies the number of particles along each axis.
+pub fn run(cases: &[&Case], scale: usize, mut watch: Watch) -> (Vec<Row>, bool) {
     let todo: Vec<(&Case, Trial)> =
         cases.iter().flat_map(|case| (case.trials)().into_iter().map(|t| (*case, t))).collect();
     let mut rows = Vec::new();
     for (case, trial) in &todo {
         if !watch(rows.len() as f64 / todo.len() as f64) {
-            return Err(Error::Cancelled);
+            return (rows, false);
         }
         rows.push(Row::new(case, trial, attempt(case, trial, scale)));
     }
-    Ok(rows)
+    (rows, true)
 }
 
 /// What was seen; none where the words are not known yet.
@@ -111,10 +109,10 @@ fn attempt(case: &Case, trial: &Trial, scale: usize) -> Option<Seen> {
 /// The suite as a study.
 ///
 /// # Errors
-/// As [`run`].
+/// As [`table::answer`].
 pub fn answer(request: Request) -> Result<Answer> {
-    let rows = run(&cases(), if request.full { 2 } else { 1 }, request.watch)?;
-    table::answer(&rows)
+    let (rows, complete) = run(&cases(), if request.full { 2 } else { 1 }, request.watch);
+    Ok(Answer { stopped: !complete, ..table::answer(&rows)? })
 }
 
 #[cfg(test)]

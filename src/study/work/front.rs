@@ -20,11 +20,19 @@ pub fn front(points: &[Point], cost: impl Fn(&Point) -> f64) -> Vec<&Point> {
 /// Errors that someone may want.
 const WANTED: &[f64] = &[1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 1e-4];
 
-/// The cheapest choice for each error, in words; the last sentence says where the choices end.
-pub fn recommend(points: &[Point]) -> Vec<String> {
+/// The cheapest choice for each error, in words; the last sentence says where the choices end, or where the reference
+/// is no longer known well enough: `doubt` is what it may be wrong by.
+pub fn recommend(points: &[Point], doubt: f64) -> Vec<String> {
     let front = front(points, |p| p.seconds);
     let mut said = Vec::new();
     for wanted in WANTED {
+        if *wanted < doubt {
+            said.push(format!(
+                "for {wanted:.0e}: not known, since the reference itself may be wrong by {}",
+                short(doubt)
+            ));
+            break;
+        }
         match front.iter().find(|p| p.error <= *wanted) {
             Some(p) => said.push(format!("for {wanted:.0e}: {}, {} ms ({})", p.choice, millis(p), short(p.error))),
             None => {
@@ -58,8 +66,10 @@ mod tests {
         let points = [point(0.03, 2e-2), point(0.01, 5e-2), point(0.02, 9e-2), point(0.1, f64::NAN), point(0.2, 2e-2)];
         let seconds: Vec<f64> = front(&points, |p| p.seconds).iter().map(|p| p.seconds).collect();
         assert_eq!(seconds, [0.01, 0.03]);
-        let said = recommend(&points);
+        let said = recommend(&points, 0.0);
         assert_eq!(said[0], "for 1e-1: brookshaw, M6 at h_fac 1, rkl2, n = 8, 10.0 ms (0.050)");
         assert!(said.len() == 3 && said[2].starts_with("for 1e-2: none of these; the best is 0.020"), "{said:?}");
+        let said = recommend(&points, 0.05);
+        assert!(said.len() == 2 && said[1].starts_with("for 3e-2: not known"), "{said:?}");
     }
 }

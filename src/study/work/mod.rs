@@ -5,18 +5,20 @@ mod front;
 mod reference;
 
 use super::catalogue::Request;
-use super::mode::{Cloud, JITTER_2D, JITTER_3D, refused};
+use super::mode::{Cloud, JITTER_2D, JITTER_3D};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
+use super::recommend::refused;
 use super::run::Study;
 use super::scene::Scene;
-use super::table::{Cell, Table, column};
+use super::table::{Cell, Table, column, short};
 use crate::error::Result;
-use choices::{Choice, choices};
-use front::{front, recommend};
-use reference::Reference;
+pub use choices::Choice;
+use choices::choices;
+pub use front::front;
+use front::recommend;
+pub use reference::Reference;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
 
 /// What a choice gave.
 #[derive(Debug, Clone)]
@@ -32,8 +34,14 @@ pub struct Point {
     pub pairs: f64,
 }
 
-/// Runs shorter than this are repeated once: the first touches cold memory.
-const SHORT: f64 = 0.1;
+impl Point {
+    fn refused(choice: Choice) -> Point {
+        Point { choice, particles: 0, neighbours: 0.0, error: f64::NAN, seconds: f64::NAN, pairs: f64::NAN }
+    }
+}
+
+/// Runs shorter than this, s, are repeated once: the first touches cold memory.
+pub const SHORT: f64 = 0.1;
 
 /// # Errors
 /// Whatever is wrong with the scene. A choice that is refused is no error but a row without one.
@@ -46,8 +54,8 @@ pub fn run(mut request: Request) -> Result<Page> {
     let folder = request.scene.as_ref().and_then(|s| s.parent().map(PathBuf::from)).unwrap_or_default();
     let share = scenes.len();
     for (k, (name, scene, sizes)) in scenes.into_iter().enumerate() {
-        let points = measure(&mut page, &mut request, &scene, &folder, &sizes, (k, share))?;
-        show(&mut page, &name, k, &points);
+        let (points, reference) = measure(&mut page, &mut request, &scene, &folder, &sizes, (k, share))?;
+        show(&mut page, &name, k, &points, &reference);
         if !page.complete {
             break;
         }
@@ -57,7 +65,7 @@ pub fn run(mut request: Request) -> Result<Page> {
 
 /// The work item that particle codes are compared on, in 3-D and in 2-D.
 fn built_in(request: &Request) -> Result<Vec<(String, Scene, Vec<u32>)>> {
-    let space = request.pick(vec![6, 8], vec![8, 12, 16, 24], vec![8, 12, 16, 24, 32, 48]);
+    let space = request.pick(vec![6, 8], vec![8, 12, 16, 20], vec![8, 12, 16, 24, 32, 48]);
     let plane = request.pick(vec![8, 16], vec![16, 32, 64], vec![16, 32, 64, 128, 256]);
     let make = |(cloud, sizes): (Cloud, Vec<u32>)| {
         let mut scene = cloud.scene(16, "")?;
@@ -74,20 +82,30 @@ fn measure(
     folder: &Path,
     sizes: &[u32],
     (part, parts): (usize, usize),
-) -> Result<Vec<Point>> {
+) -> Result<(Vec<Point>, Reference)> {
     let mut scene = scene.clone();
     scene.output = None;
     let choices = choices(&scene, sizes, request);
     let reference = Reference::of(&scene, folder, &choices)?;
-    let mut points = Vec::new();
-    for (done, choice) in choices.iter().enumerate() {
-        if !request.goes_on(part * choices.len() + done, parts * choices.len()) {
-            page.complete = false;
-            break;
-        }
-        points.push(try_once_or_twice(&scene, folder, choice, &reference)?);
-    }
-    Ok(points)
+    let goes_on = |done: usize| request.goes_on(part * choices.len() + done, parts * choices.len());
+    let points = points(&scene, folder, &choices, &reference, goes_on)?;
+    page.complete &= points.len() == choices.len();
+    Ok((points, reference))
+}
+
+/// What each choice gives, as far as `goes_on` lets them.
+///
+/// # Errors
+/// Whatever is wrong with the scene. A choice that is refused is a point without an error.
+pub fn points(
+    scene: &Scene,
+    folder: &Path,
+    choices: &[Choice],
+    reference: &Reference,
+    mut goes_on: impl FnMut(usize) -> bool,
+) -> Result<Vec<Point>> {
+    let wanted = choices.iter().enumerate().take_while(|(done, _)| goes_on(*done));
+    wanted.map(|(_, choice)| try_once_or_twice(scene, folder, choice, reference)).collect()
 }
 
 fn try_once_or_twice(scene: &Scene, folder: &Path, choice: &Choice, reference: &Reference) -> Result<Point> {
@@ -100,19 +118,15 @@ fn try_once_or_twice(scene: &Scene, folder: &Path, choice: &Choice, reference: &
 }
 
 fn try_once(scene: &Scene, folder: &Path, choice: &Choice, reference: &Reference) -> Result<Point> {
-    let scene = choice.put_into(scene)?;
-    let start = Instant::now();
-    let report =
-        Study::new(scene, folder).and_then(|study| reference.known_to(study).run(Path::new(""), Box::new(|_| true)));
-    let seconds = start.elapsed().as_secs_f64();
+    let study = Study::new(choice.put_into(scene), folder).and_then(|study| reference.known_to(study, choice));
+    let report = study.and_then(|study| study.run(Path::new(""), Box::new(|_| true)));
     let choice = choice.clone();
     let report = match report {
         Ok(report) => report,
-        Err(e) if refused(&e) => {
-            return Ok(Point { choice, particles: 0, neighbours: 0.0, error: f64::NAN, seconds, pairs: f64::NAN });
-        }
+        Err(e) if refused(&e) => return Ok(Point::refused(choice)),
         Err(e) => return Err(e),
     };
+    let seconds = report.seconds.setup + report.seconds.solve;
     let (particles, neighbours) = (report.particles, report.neighbours);
     let pairs = report.work.applications as f64 * particles as f64 * neighbours;
     Ok(Point { choice, particles, neighbours, error: report.accuracy.map_or(f64::NAN, |a| a.l2), seconds, pairs })
@@ -120,7 +134,7 @@ fn try_once(scene: &Scene, folder: &Path, choice: &Choice, reference: &Reference
 
 const NAMES: [(&str, &str); 2] = [("points", "front"), ("points_2", "front_2")];
 
-fn show(page: &mut Page, scene: &str, index: usize, points: &[Point]) {
+fn show(page: &mut Page, scene: &str, index: usize, points: &[Point], reference: &Reference) {
     let best = front(points, |p| p.seconds);
     let (all, few) = NAMES[index.min(NAMES.len() - 1)];
     page.tables.push(table(Table::new(few, &[]), &best));
@@ -129,10 +143,17 @@ fn show(page: &mut Page, scene: &str, index: usize, points: &[Point]) {
     page.plots.push(plot(scene, "pair operations", points, |p| p.pairs));
     let lost = points.iter().filter(|p| p.error.is_nan()).count();
     page.find(format!("{scene}: {} choices tried, {lost} refused by the solver or its operator", points.len()));
-    page.findings.extend(recommend(points).into_iter().map(|sentence| format!("{scene}: {sentence}")));
+    let doubt = reference.about().map_or(0.0, |(_, error)| error);
+    if let Some((name, error)) = reference.about() {
+        page.find(format!(
+            "{scene}: no exact solution is named; the reference, {name}, may be wrong by {}",
+            short(error)
+        ));
+    }
+    page.findings.extend(recommend(points, doubt).into_iter().map(|sentence| format!("{scene}: {sentence}")));
 }
 
-fn table(mut table: Table, points: &[&Point]) -> Table {
+pub fn table(mut table: Table, points: &[&Point]) -> Table {
     let names = ["operator", "kernel", "h_fac", "integrator", "n", "particles", "neighbours", "l2"];
     table.columns = names.map(|name| column(name, "")).into();
     table.columns.extend([column("run time", "s"), column("pair operations", "")]);
@@ -147,7 +168,7 @@ fn table(mut table: Table, points: &[&Point]) -> Table {
 }
 
 /// All points by operator, and the front.
-fn plot(scene: &str, cost: &str, points: &[Point], of: fn(&Point) -> f64) -> Plot {
+pub fn plot(scene: &str, cost: &str, points: &[Point], of: fn(&Point) -> f64) -> Plot {
     let mut plot = Plot::new(format!("{scene}: error against {cost}"), Axis::log(cost), Axis::log("relative l2 error"));
     let mut operators: Vec<&str> = points.iter().map(|p| p.choice.operator).collect();
     operators.dedup();
@@ -155,6 +176,6 @@ fn plot(scene: &str, cost: &str, points: &[Point], of: fn(&Point) -> f64) -> Plo
         let own = points.iter().filter(|p| p.choice.operator == operator);
         plot.add(operator, Style::Points, own.map(|p| (of(p), p.error)).collect());
     }
-    plot.add("front", Style::Line, front(points, of).into_iter().map(|p| (of(p), p.error)).collect());
+    plot.add("front", Style::Front, front(points, of).into_iter().map(|p| (of(p), p.error)).collect());
     plot
 }
