@@ -47,7 +47,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ("max_stages", "most stages of rkl1 and rkl2 before a step is cut into sub-steps"),
     (
         "bounds",
-        "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep)",
+        "keep: euler, ssprk2 and ssprk3 sub-step so that no new extremum appears; free: stability only (default keep where the operator can: not direct, consistent or two-first)",
     ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     (
@@ -146,7 +146,7 @@ impl Choices {
             None => false,
             Some(word) => choice("allow", word, &[("unstable", true)])?,
         };
-        let options = options(&mut words)?;
+        let options = options(&mut words, operator)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
         let tolerance = tolerance(&mut words, auto.as_ref().map(|_| auto::TOLERANCE))?;
         let preconditioner =
@@ -191,8 +191,10 @@ impl Choices {
     }
 }
 
-fn options(words: &mut Words) -> Result<Options> {
-    let mut options = Options { keep_bounds: true, max_applications: 10_000_000, ..Options::default() };
+fn options(words: &mut Words, operator: &Operator) -> Result<Options> {
+    // Sub-steps that keep bounds would be short for nothing where the operator does not.
+    let keep_bounds = operator.positive || matches!(operator.tensor, Tensor::Angular(_));
+    let mut options = Options { keep_bounds, max_applications: 10_000_000, ..Options::default() };
     options.stages = words.count("stages", 1..=10_000)?.map(|s| s as u32);
     if let Some(most) = words.count("max_stages", 3..=10_000)? {
         options.max_stages = most as u32;
