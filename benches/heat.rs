@@ -1,10 +1,11 @@
-//! Speed of the work item that particle codes are compared on: a periodic cube of n³ particles, each moved by up to
-//! 20 % of the spacing, M4 with h_fac 1.3 (some 80 neighbours), stored weights.
+//! Speed of explicit steps on the work item of particle codes (`work_item`), stored weights.
 //!
 //! `cargo bench` times the parts with divan and then prints one table, its rows measured in turn in the same run: ns per
 //! particle-step and per pair, the set-up in steps, bytes per particle, and the share of the memory's read bandwidth
 //! that a step reaches. Where DIFFUSPH_PYTHON names a Python with scipy, its sparse product runs in turn with ours.
 //! `BENCH=full cargo bench` adds sizes up to 4 million particles.
+
+mod work_item;
 
 use diffusph::{Solver, Strided};
 use divan::Bencher;
@@ -12,6 +13,7 @@ use divan::counter::{BytesCount, ItemsCount};
 use std::f64::consts::PI;
 use std::process::Command;
 use std::time::Instant;
+use work_item::{median, positions};
 
 fn main() {
     divan::main();
@@ -30,32 +32,15 @@ struct Item {
     dt: f64,
 }
 
-fn positions(n: usize) -> Vec<f64> {
-    let mut state = 12345u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    let cells = (0..n * n * n).flat_map(|p| [p % n, p / n % n, p / n / n]);
-    cells.map(|c| (c as f64 + 0.5 + 0.2 * uniform()) / n as f64).collect()
-}
-
 impl Item {
     fn new(n: usize, threads: usize) -> Item {
         Item::with(n, &format!("integrator=euler threads={threads}"))
     }
 
     fn with(n: usize, words: &str) -> Item {
-        let (x, count) = (positions(n), n * n * n);
-        let words = format!("heat dim=3 kernel=M4 h_fac=1.3 {words}");
-        let mut solver = Solver::new(&words).unwrap();
-        solver.set_box(&[0.0; 3], &[1.0; 3], &[true; 3]).unwrap();
-        solver.set_particles(Strided::new("x", &x, count, 3, 3).unwrap()).unwrap();
-        for (name, value) in [("m", 1.0 / count as f64), ("rho", 1.0), ("kappa", 1.0)] {
-            solver.set_number(name, value).unwrap();
-        }
+        let x = positions(n);
         let t: Vec<f64> = x.chunks(3).map(|p| p.iter().map(|c| (2.0 * PI * c).sin()).product()).collect();
-        solver.set("T", Strided::packed(&t)).unwrap();
+        let solver = work_item::solver(&x, &t, words);
         // A tenth of the explicit limit: one application of the operator, and no other bound is asked for.
         let dt = 0.03 / (n * n) as f64;
         Item { n, x, solver, dt }
@@ -117,11 +102,6 @@ fn read(data: &[f64], threads: usize) -> f64 {
     });
     divan::black_box(total);
     size_of_val(data) as f64 / start.elapsed().as_secs_f64()
-}
-
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
 }
 
 /// One row per size and number of threads; rivals in turn.

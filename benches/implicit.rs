@@ -1,12 +1,14 @@
-//! Speed of implicit steps on the work item of `heat`: a hot cube on a periodic cube of n³ jittered particles, M4 with
-//! some 80 neighbours, one step of backward Euler at a million times the explicit limit, solved to 1e-8.
+//! Speed of implicit steps on the work item of particle codes (`work_item`): a hot cube, one step of backward Euler at a million times the explicit limit, solved to 1e-8.
 //!
 //! Prints, for each preconditioner: iterations, what a step and the set-up of the preconditioner cost in units of one
 //! application of the operator, as Euler's sub-steps make it in turn, and bytes. `BENCH=full cargo bench` adds a million particles.
 
+mod work_item;
+
 use diffusph::plan::Report;
 use diffusph::{Solver, Strided};
 use std::time::Instant;
+use work_item::{median, positions};
 
 const STIFF: f64 = 1e6;
 
@@ -24,29 +26,6 @@ fn main() {
     }
 }
 
-fn positions(n: usize) -> Vec<f64> {
-    let mut state = 12345u64;
-    let mut uniform = || {
-        state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
-        (state >> 11) as f64 / (1u64 << 52) as f64 - 1.0
-    };
-    let cells = (0..n * n * n).flat_map(|p| [p % n, p / n % n, p / n / n]);
-    cells.map(|c| (c as f64 + 0.5 + 0.2 * uniform()) / n as f64).collect()
-}
-
-/// A solver of the work item.
-fn solver(x: &[f64], words: &str) -> Solver {
-    let count = x.len() / 3;
-    let mut solver = Solver::new(&format!("heat dim=3 kernel=M4 h_fac=1.3 threads=2 {words}")).unwrap();
-    solver.set_box(&[0.0; 3], &[1.0; 3], &[true; 3]).unwrap();
-    solver.set_particles(Strided::new("x", x, count, 3, 3).unwrap()).unwrap();
-    for (name, value) in [("m", 1.0 / count as f64), ("rho", 1.0), ("kappa", 1.0)] {
-        solver.set_number(name, value).unwrap();
-    }
-    solver.set("T", Strided::packed(&temperatures(x))).unwrap();
-    solver
-}
-
 fn temperatures(x: &[f64]) -> Vec<f64> {
     let inside = |p: &[f64]| p.iter().all(|c| (c - 0.5).abs() < 0.25);
     x.chunks(3).map(|p| if inside(p) { 10.0 } else { 0.1 }).collect()
@@ -58,17 +37,14 @@ fn seconds(work: impl FnOnce()) -> f64 {
     start.elapsed().as_secs_f64()
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
-    values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
-}
-
 fn row(n: usize, preconditioner: &str) {
     let (x, particles) = (positions(n), n * n * n);
-    let mut euler = solver(&x, "integrator=euler bounds=free");
+    let t = temperatures(&x);
+    let solver = |words: &str| work_item::solver(&x, &t, &format!("threads=2 {words}"));
+    let mut euler = solver("integrator=euler bounds=free");
     let words = "integrator=backward-euler solver_tolerance=1e-8 preconditioner=";
-    let mut implicit = solver(&x, &format!("{words}{preconditioner}"));
-    let (limit, t) = (euler.limit().unwrap(), temperatures(&x));
+    let mut implicit = solver(&format!("{words}{preconditioner}"));
+    let limit = euler.limit().unwrap();
     implicit.get_number("mean_neighbours").unwrap();
     let (mut report, mut applications, mut steps, mut first) = (Report::default(), vec![], vec![], vec![]);
     for _ in 0..5 {

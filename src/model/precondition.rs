@@ -36,9 +36,12 @@ impl Heat<'_> {
         fine: Fine,
         work: impl FnOnce(&mut Self, &mut Multigrid) -> Result<()>,
     ) -> Result<bool> {
+        let Pairs::Stored(matrix) = self.pairs else { return Ok(false) };
+        if self.stiff.is_infinite() {
+            return Ok(false);
+        }
         // The explicit limit is 2 over the largest eigenvalue, which is little more than the largest diagonal element.
         let length = 0.5 * fine.g * sum::max(self.pool, fine.diagonal.len(), |i| fine.diagonal[i]);
-        let Pairs::Stored(matrix) = self.pairs else { return Ok(false) };
         let Some(multigrid) = self.multigrid.take_if(|_| length >= self.stiff) else { return Ok(false) };
         if multigrid.is_empty() {
             let couplings = Couplings { matrix, kappa: self.pair_kappa(), factor: self.factor() };

@@ -1,6 +1,7 @@
 //! Whether an operator that is not symmetric has growing modes: the largest real part in its spectrum, by Arnoldi's
 //! method (Arnoldi 1951; Saad 2011, chapter 6).
 
+use super::spectrum::start;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
@@ -9,6 +10,9 @@ use nalgebra::{DMatrix, linalg::Schur};
 
 /// Applications of the operator. A mode that grows by a hundredth of the fastest rate stands out after them by e^8.
 const APPLICATIONS: usize = 40;
+
+/// What is left of a vector outside a space, below which it is rounding.
+const SPANNED: f64 = 1e-12;
 
 /// The largest real part among the Ritz values of an operator, in its own unit, and the largest modulus beside it.
 ///
@@ -28,13 +32,12 @@ pub fn rightmost(
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut hessenberg = DMatrix::<f64>::zeros(APPLICATIONS + 1, APPLICATIONS);
     let mut length = dot(&next, &next).sqrt();
-    let mut largest = 0.0f64;
     for k in 0..APPLICATIONS {
         if !length.is_finite() {
             return Err(Error::NotFinite { what: "the spectrum of the operator".into(), index: 0, value: length });
         }
-        // Nothing is left that the vectors before do not span.
-        if length <= 1e-12 * largest || length == 0.0 {
+        // Nobody takes part.
+        if length == 0.0 {
             break;
         }
         if k > 0 {
@@ -43,6 +46,7 @@ pub fn rightmost(
         pool.chunks(&mut next, BLOCK, |_, part| part.iter_mut().for_each(|v| *v /= length));
         basis.push(memory::copied("Krylov space", &next)?);
         apply(&basis[k], &mut next)?;
+        let whole = dot(&next, &next).sqrt();
         for (j, vector) in basis.iter().enumerate() {
             let share = dot(vector, &next);
             hessenberg[(j, k)] = share;
@@ -51,7 +55,10 @@ pub fn rightmost(
             });
         }
         length = dot(&next, &next).sqrt();
-        largest = largest.max(length);
+        // The vectors so far span all that the operator can reach.
+        if length <= SPANNED * whole {
+            break;
+        }
     }
     extremes(hessenberg.view((0, 0), (basis.len(), basis.len())).into_owned())
 }
@@ -70,11 +77,6 @@ fn extremes(matrix: DMatrix<f64>) -> Result<(f64, f64)> {
     let values = schur.complex_eigenvalues();
     let fold = |of: fn(f64, f64) -> f64, start| values.iter().map(|v| of(v.re, v.im)).fold(start, f64::max);
     Ok((fold(|re, _| re, f64::NEG_INFINITY), fold(f64::hypot, 0.0)))
-}
-
-/// A start vector with something of every mode, the same on every machine.
-fn start(i: usize) -> f64 {
-    (1.0 + i as f64 * 0.618_033_988_749_894_9).fract() - 0.5
 }
 
 #[cfg(test)]

@@ -60,7 +60,7 @@ pub fn estimate(
 }
 
 /// A start vector that is rich in the fastest modes and the same on every machine: signs and sizes from a hash.
-fn start(i: usize) -> f64 {
+pub(super) fn start(i: usize) -> f64 {
     let mixed = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     let bits = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11;
     bits as f64 / (1u64 << 52) as f64 - 1.0

@@ -59,18 +59,21 @@ impl System for Heat<'_> {
     }
 
     fn precondition(&mut self, shifted: Shifted, r: &[f64], z: &mut [f64]) -> Result<bool> {
-        let Shifted { g, diagonal, weight } = shifted;
-        Heat::precondition(self, Fine { pool: self.pool, g, diagonal, weight }, r, z)
+        Heat::precondition(self, fine(self.pool, shifted), r, z)
     }
 
     fn flatten(&mut self, shifted: Shifted, y: &[f64], x: &mut [f64]) -> Result<bool> {
-        let Shifted { g, diagonal, weight } = shifted;
-        Heat::flatten(self, Fine { pool: self.pool, g, diagonal, weight }, y, x)
+        Heat::flatten(self, fine(self.pool, shifted), y, x)
     }
 
     fn supply(&mut self, t: f64, y: &[f64]) -> Result<Option<f64>> {
         Heat::supply(self, t, y)
     }
+}
+
+/// The equations of a stage as the preconditioner takes them.
+fn fine<'a>(pool: &'a Pool, Shifted { g, diagonal, weight }: Shifted<'a>) -> Fine<'a> {
+    Fine { pool, g, diagonal, weight }
 }
 
 /// The largest explicit Euler step that is stable under these bounds; infinite where nothing diffuses.
@@ -214,7 +217,7 @@ impl Motion<'_> {
         let start = Instant::now();
         let known = self.known_or_proven(time, t)?;
         let enough = self.plan.leaves_out("proven_bound") && self.is_least_work(dt, known.bounds);
-        let bounds = if enough { known.bounds } else { self.refined_bounds(time, t)? };
+        let bounds = if enough { known.bounds } else { self.refined(known, t)? };
         self.timers.add("bound", start.elapsed());
         Ok(bounds)
     }
@@ -222,6 +225,10 @@ impl Motion<'_> {
     /// The best bounds there are: Gershgorin's, lowered by power iteration.
     pub fn refined_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
         let known = self.known_or_proven(time, t)?;
+        self.refined(known, t)
+    }
+
+    fn refined(&mut self, known: Known, t: &[f64]) -> Result<Bounds> {
         if known.refined {
             return Ok(known.bounds);
         }
@@ -254,10 +261,14 @@ impl Motion<'_> {
 
     /// The fastest growth of a mode of the operator, and its largest rate, 1/s.
     pub fn growth(&mut self, t: &[f64]) -> Result<(f64, f64)> {
-        let (heat, pool) = (&mut self.heat, self.pool);
-        let weight = memory::collected("capacities", heat.inverse_capacity.iter().map(|&i| heat::capacity(i)))?;
-        heat.linearise_surface(t)?;
-        arnoldi::rightmost(pool, &weight, |x, y| heat.linear(x, y))
+        let weight = self.linearise_about(t)?;
+        arnoldi::rightmost(self.pool, &weight, |x, y| self.heat.linear(x, y))
+    }
+
+    /// Makes the operator linear about T; answers the capacities, in whose norm it is symmetric if it is at all.
+    fn linearise_about(&mut self, t: &[f64]) -> Result<Vec<f64>> {
+        self.heat.linearise_surface(t)?;
+        memory::collected("capacities", self.heat.inverse_capacity.iter().map(|&i| heat::capacity(i)))
     }
 
     /// An operator whose modes grow is of no use, however small the step.
@@ -299,10 +310,8 @@ impl Motion<'_> {
         if proven.spectral == 0.0 {
             return Ok(proven);
         }
-        let (heat, pool) = (&mut self.heat, self.pool);
-        let weight = memory::collected("capacities", heat.inverse_capacity.iter().map(|&i| heat::capacity(i)))?;
-        heat.linearise_surface(t)?;
-        let spectral = spectrum::largest(pool, &weight, proven.spectral, |x, y| heat.linear(x, y))?;
+        let weight = self.linearise_about(t)?;
+        let spectral = spectrum::largest(self.pool, &weight, proven.spectral, |x, y| self.heat.linear(x, y))?;
         Ok(Bounds { spectral, ..proven })
     }
 
