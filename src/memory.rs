@@ -24,6 +24,15 @@ pub fn collected<T>(what: &str, items: impl ExactSizeIterator<Item = T>) -> Resu
     Ok(v)
 }
 
+/// Makes an array at least `n` long with copies of `value`, or `NoMemory`.
+pub fn extended<T: Clone>(what: &str, v: &mut Vec<T>, n: usize, value: T) -> Result<()> {
+    if n > v.len() {
+        v.try_reserve(n - v.len()).map_err(|_| no_memory::<T>(what, n))?;
+        v.resize(n, value);
+    }
+    Ok(())
+}
+
 /// An empty array with room for exactly `n`, or `NoMemory`.
 pub fn reserved<T>(what: &str, n: usize) -> Result<Vec<T>> {
     let mut v = Vec::new();

@@ -156,5 +156,5 @@ fn operators_of_two_sweeps_say_that_the_diagonal_serves() {
     let s = unit_box("operator=two-first integrator=backward-euler", &x, 2, true).plan().unwrap().to_string();
     assert!(s.contains("jacobi because multigrid needs an operator that is one matrix"), "{s}");
     let e = Solver::new("heat dim=2 operator=two-first integrator=sdirk2 preconditioner=multigrid").err().unwrap();
-    assert!(e.to_string().contains("one matrix: brookshaw, kernel, monotone"), "{e}");
+    assert!(e.to_string().contains("one matrix: brookshaw, kernel, projected, monotone"), "{e}");
 }

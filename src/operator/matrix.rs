@@ -13,6 +13,10 @@ use std::ops::Range;
 /// 0.8 times the time of asking for a row at once.
 const AHEAD: usize = 512;
 
+/// K_a below which a particle counts as having too few neighbours for its weights to be normalised: scaling them up
+/// by more than this would make a lone pair as stiff as it is meaningless.
+const LEAST_MOMENT: f64 = 0.1;
+
 /// Symmetric coefficients g_ab = V_a V_b w_ab (and what was folded into them), in rows.
 pub struct Matrix {
     n: usize,
@@ -37,16 +41,15 @@ impl Seen {
         let blocks = n.div_ceil(BLOCK);
         self.0.try_reserve(blocks).map_err(|_| memory::no_memory::<bool>("block list", blocks))?;
         self.0.resize(blocks, false);
-        let mut list = Vec::new();
-        for &j in col {
-            let seen = &mut self.0[j as usize / BLOCK];
-            if !*seen {
-                *seen = true;
-                list.push(j / BLOCK as u32);
-            }
-        }
-        list.sort_unstable();
-        list.iter().for_each(|&block| self.0[block as usize] = false);
+        // Noted without looking, and looked at once: a branch for each pair would cost more.
+        col.iter().for_each(|&j| self.0[j as usize / BLOCK] = true);
+        // The sums do not look again whether a neighbour exists.
+        let complete = n.is_multiple_of(BLOCK) || !self.0.last().is_some_and(|seen| *seen);
+        assert!(complete || col.iter().all(|&j| (j as usize) < n), "a neighbour that does not exist");
+        let count = self.0.iter().filter(|seen| **seen).count();
+        let mut list = memory::reserved("block list", count)?;
+        list.extend((0..blocks as u32).filter(|&block| self.0[block as usize]));
+        self.0.fill(false);
         Ok(list)
     }
 }
@@ -57,14 +60,12 @@ impl Block {
     ///
     /// # Errors
     /// `NoMemory`.
-    pub fn new(n: usize, b: usize, start: Vec<u32>, col: &[u32], coef: &[f64], seen: &mut Seen) -> Result<Block> {
-        assert!(col.iter().all(|&j| (j as usize) < n), "a neighbour that does not exist");
+    pub fn new(n: usize, b: usize, start: Vec<u32>, col: Vec<u32>, coef: Vec<f64>, seen: &mut Seen) -> Result<Block> {
         if col.len() > u32::MAX as usize {
             return Err(memory::no_memory::<(u32, f64)>("matrix", col.len()));
         }
-        let touches = seen.touched(n, col)?;
-        let coef = memory::copied("matrix coefficients", coef)?;
-        Ok(Block { first: b * BLOCK, start, col: memory::copied("matrix columns", col)?, coef, touches })
+        let touches = seen.touched(n, &col)?;
+        Ok(Block { first: b * BLOCK, start, col: fitted(col)?, coef: fitted(coef)?, touches })
     }
 
     fn len(&self) -> usize {
@@ -91,6 +92,14 @@ impl Block {
 
     fn bytes(&self) -> u64 {
         memory::bytes(&self.start) + memory::bytes(&self.col) + memory::bytes(&self.coef) + memory::bytes(&self.touches)
+    }
+}
+
+/// The same items, in an array that is not much larger.
+fn fitted<T: Copy>(items: Vec<T>) -> Result<Vec<T>> {
+    match items.capacity() > items.len() + items.len() / 16 {
+        true => memory::copied("matrix", &items),
+        false => Ok(items),
     }
 }
 
@@ -130,17 +139,36 @@ impl Matrix {
     }
 
     /// Multiplies each coefficient by `factor(a, b)`, which must be symmetric to the bit.
-    pub fn scale(&mut self, pool: &Pool, factor: impl Fn(usize, usize) -> f64 + Sync + Send) {
+    pub fn scale(&mut self, pool: &Pool, factor: impl Fn(usize, usize) -> f64 + Copy + Sync + Send) {
+        self.update(pool, move |a, b, _, g| g * factor(a, b));
+    }
+
+    /// Replaces each coefficient by `value(a, b, place in its block, g_ab)`, which must be symmetric to the bit.
+    pub fn update(&mut self, pool: &Pool, value: impl Fn(usize, usize, usize, f64) -> f64 + Copy + Sync + Send) {
         pool.chunks(&mut self.blocks, 1, |_, part| {
+            // A copy: what it refers to can then stay in registers while coefficients are written.
+            let of_pair = value;
             for block in part {
                 for k in 0..block.len() {
                     let (i, range) = block.row(k);
-                    for at in range {
-                        block.coef[at] *= factor(i, block.col[at] as usize);
+                    let pairs = block.coef[range.clone()].iter_mut().zip(&block.col[range.clone()]);
+                    for ((g, &j), at) in pairs.zip(range) {
+                        *g = of_pair(i, j as usize, at, *g);
                     }
                 }
             }
         });
+    }
+
+    /// Scales pairs by the mean of 1/K_a and 1/K_b.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn normalise(&mut self, pool: &Pool, moments: &[f64]) -> Result<()> {
+        let half = memory::collected("normalisation", moments.iter().map(|&k| 0.5 / k.max(LEAST_MOMENT)))?;
+        let half = &half[..];
+        self.scale(pool, move |a, b| half[a] + half[b]);
+        Ok(())
     }
 
     /// out_a = finish(a, Σ_b g_ab mean(k_a, k_b) (T_b − T_a)), the mean left out where `kappa` is none.
@@ -327,7 +355,7 @@ mod tests {
                 }
                 start.push(col.len() as u32);
             }
-            list.push(Block::new(n, b, start, &col, &coef, &mut seen).unwrap());
+            list.push(Block::new(n, b, start, col, coef, &mut seen).unwrap());
         }
         (Matrix::new(n, list), t, sums)
     }

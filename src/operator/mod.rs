@@ -22,6 +22,7 @@ pub mod mean;
 pub mod moments;
 pub mod multigrid;
 pub mod once;
+mod projected;
 pub mod sparse;
 pub mod spectrum;
 mod stencils;

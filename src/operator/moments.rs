@@ -1,6 +1,6 @@
 //! How good an operator is where a particle stands: the first moment of its weights, which is 0 for a perfect
-//! Laplacian. (The second moment, K_d2, falls out of the assembly, [`super::once::Assembly::store`], unless weights are
-//! symmetrised afterwards.)
+//! Laplacian. (The second moment, K_d2, falls out of the assembly, [`super::once::Assembly::store`], unless rows have to
+//! agree afterwards.)
 
 use super::Matrix;
 use super::once::{Assembly, Buffers};
@@ -9,18 +9,22 @@ use crate::memory;
 use crate::pool::Pool;
 use crate::space::{Axes, Row};
 
-/// h_a Σ_b V_b w_ab (r_b − r_a) for each particle: dimensionless, one component per axis.
-pub fn first(assembly: &Assembly, pool: &Pool) -> Result<Vec<Axes<f64>>> {
+/// h_a Σ_b V_b w_ab (r_b − r_a) for each particle: dimensionless, one component per axis. `stored`: where coefficients are
+/// not those that the assembly makes of a row.
+pub fn first(assembly: &Assembly, stored: Option<&Matrix>, pool: &Pool) -> Result<Vec<Axes<f64>>> {
     let mut out = memory::filled("first moments", assembly.volume.len(), [0.0; 3])?;
-    assembly.rows.map(pool, &mut out, |buffers: &mut Buffers, row: Row| {
-        let w = assembly.weights(&row, buffers)?;
-        let h = assembly.rows.h[row.i];
-        let mut moment = [0.0; 3];
-        for (axis, m) in moment.iter_mut().enumerate().take(assembly.kernel.dim()) {
-            let terms = row.j.iter().zip(w).zip(row.d[axis]);
-            *m = h * terms.map(|((&j, w), d)| assembly.volume[j as usize] * w * d).sum::<f64>();
-        }
-        Ok(moment)
+    assembly.rows.map(pool, &mut out, |(buffers, made): &mut (Buffers, Vec<f64>), row: Row| {
+        let g = match stored {
+            Some(matrix) => matrix.coefficients(row.i),
+            None => {
+                made.clear();
+                made.extend(assembly.coefficients(&row, assembly.weights(&row, buffers)?));
+                made
+            }
+        };
+        let scale = assembly.rows.h[row.i] / assembly.volume[row.i];
+        let sum = |d: &[f64]| scale * g.iter().zip(d).map(|(g, d)| g * d).sum::<f64>();
+        Ok(row.d.map(sum))
     })?;
     Ok(out)
 }
@@ -30,8 +34,20 @@ pub fn second(assembly: &Assembly, matrix: &Matrix, pool: &Pool) -> Result<Vec<f
     let mut out = memory::filled("second moments", assembly.volume.len(), 0.0)?;
     let nu = assembly.kernel.dim() as f64;
     assembly.rows.map(pool, &mut out, |_: &mut (), row: Row| {
-        let sum: f64 = matrix.coefficients(row.i).iter().zip(row.r).map(|(g, r)| g * (r * r)).sum();
-        Ok(sum / (2.0 * nu * assembly.volume[row.i]))
+        Ok(of_row(matrix.coefficients(row.i), row.r) / (2.0 * nu * assembly.volume[row.i]))
     })?;
     Ok(out)
+}
+
+/// Σ_b g_ab r². Four running sums, as in [`super::matrix`].
+pub fn of_row(g: &[f64], r: &[f64]) -> f64 {
+    let mut sums = [0.0; 4];
+    let (fours, rs) = (g.chunks_exact(4), r.chunks_exact(4));
+    let rest: f64 = fours.remainder().iter().zip(rs.remainder()).map(|(g, r)| g * (r * r)).sum();
+    for (g, r) in fours.zip(rs) {
+        for k in 0..4 {
+            sums[k] += g[k] * (r[k] * r[k]);
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }

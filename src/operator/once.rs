@@ -8,7 +8,7 @@ use super::matrix::{Block, Matrix, Seen, row_sum};
 use super::table::Tensor;
 use super::tensor::{self, Sym};
 use super::twice::Twice;
-use super::{Mean, Operator, consistent, moments, stencils};
+use super::{Mean, Operator, consistent, moments, projected, stencils};
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::memory;
@@ -106,10 +106,15 @@ impl Assembly<'_> {
             moments.extend_from_slice(&k);
         }
         let mut matrix = Matrix::new(n, blocks);
-        if matches!(self.operator.tensor, Tensor::Stencils) {
-            matrix.symmetrise(pool)?;
-            moments = moments::second(self, &matrix, pool)?;
+        match self.operator.tensor {
+            Tensor::Stencils => matrix.symmetrise(pool)?,
+            Tensor::Projected => {
+                matrix.normalise(pool, &moments)?;
+                projected::project(self, &mut matrix, pool)?;
+            }
+            _ => return Ok((matrix, moments)),
         }
+        moments = moments::second(self, &matrix, pool)?;
         Ok((matrix, moments))
     }
 
@@ -139,18 +144,19 @@ impl Assembly<'_> {
     }
 
     /// g_ab = V_a V_b w_ab of a row.
-    fn coefficients<'b>(&'b self, row: &'b Row, w: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
-        let own = self.volume[row.i];
-        row.j.iter().zip(w).map(move |(&j, w)| (own * self.volume[j as usize]) * w)
+    pub fn coefficients<'b>(&'b self, row: &'b Row, w: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
+        let (volume, own) = (self.volume, self.volume[row.i]);
+        row.j.iter().zip(w).map(move |(&j, w)| (own * volume[j as usize]) * w)
     }
 
     fn block(&self, space: &mut Workspace, b: usize) -> Result<(Block, Vec<f64>)> {
         let range = b * BLOCK..((b + 1) * BLOCK).min(self.volume.len());
-        let Workspace { scratch, buffers, col, coef, seen } = space;
-        col.clear();
-        coef.clear();
+        let Workspace { scratch, buffers, seen, pairs } = space;
+        // Made in place, in as much room as the last block took: a copy would cost as much as the weights themselves.
+        let mut col = memory::reserved("matrix columns", *pairs)?;
+        let mut coef = memory::reserved("matrix coefficients", *pairs)?;
         let mut start = memory::reserved("matrix rows", range.len() + 1)?;
-        let mut moments = memory::reserved("second moments", range.len())?;
+        let mut k = memory::reserved("second moments", range.len())?;
         let mut failed = Ok(());
         let dim = self.kernel.dim() as f64;
         start.push(0);
@@ -160,15 +166,15 @@ impl Assembly<'_> {
                 Ok(_) => return failed = Err(memory::no_memory::<(u32, f64)>("matrix", row.len())),
                 Err(e) => return failed = Err(e),
             };
-            let second = row.j.iter().zip(w).zip(row.r);
-            let k: f64 = second.map(|((&j, w), r)| self.volume[j as usize] * (r * r) * w).sum();
+            let from = col.len();
             col.extend_from_slice(row.j);
             coef.extend(self.coefficients(&row, w));
-            moments.push(k / (2.0 * dim));
+            k.push(moments::of_row(&coef[from..], row.r) / (2.0 * dim * self.volume[row.i]));
             start.push(col.len() as u32);
         })?;
         failed?;
-        Ok((Block::new(self.volume.len(), b, start, col, coef, seen)?, moments))
+        *pairs = col.len() + col.len() / 64;
+        Ok((Block::new(self.volume.len(), b, start, col, coef, seen)?, k))
     }
 }
 
@@ -176,9 +182,9 @@ impl Assembly<'_> {
 struct Workspace {
     scratch: Scratch,
     buffers: Buffers,
-    col: Vec<u32>,
-    coef: Vec<f64>,
     seen: Seen,
+    /// Room for the pairs of a block.
+    pairs: usize,
 }
 
 impl Buffers {

@@ -28,6 +28,8 @@ pub enum Tensor {
     Angular(fn(along: f64, nu: f64) -> f64),
     /// It does not: weights are fitted, particle by particle, to be exact for polynomials.
     Consistent,
+    /// It does not: positive weights are fitted to the moments of a Laplacian, all particles together.
+    Projected,
     /// Positive weights fitted to S particle by particle.
     Stencils,
     /// Gradient, flux, divergence: two sweeps over the pairs. The weights of pairs serve its stabiliser. `limited`: no
@@ -99,6 +101,16 @@ pub static OPERATORS: &[Operator] = &[
         weight: |kernel, q, w, _| kernel.w(q, w),
     },
     Operator {
+        name: "projected",
+        about: "Brookshaw's weights moved as little as makes them exact for quadratic T at every particle at once, none of \
+                them negative; symmetric, conservative, positive; takes time to make",
+        positive: true,
+        dissipative: true,
+        normalise: false,
+        tensor: Tensor::Projected,
+        weight: brookshaw,
+    },
+    Operator {
         name: "espanol-revenga",
         about: "tensor kappa: w = -((nu + 2) r.kappa.r - tr kappa) F/r (Espanol & Revenga 2003); symmetric, conservative, \
                 positive only while kappa_par <= 3 kappa_perp",
@@ -153,7 +165,12 @@ pub static OPERATORS: &[Operator] = &[
 impl Operator {
     /// Whether it takes a conductivity that is not the same in all directions.
     pub fn takes_tensors(&self) -> bool {
-        !matches!(self.tensor, Tensor::Scalar | Tensor::Consistent)
+        !matches!(self.tensor, Tensor::Scalar | Tensor::Consistent | Tensor::Projected)
+    }
+
+    /// Whether a weight depends on more than the row that it is in, so that all rows must be made before one is used.
+    pub fn joins_rows(&self) -> bool {
+        matches!(self.tensor, Tensor::Stencils | Tensor::Projected)
     }
 
     /// Whether its stored weights are all of it.

@@ -30,7 +30,10 @@ pub static WORDS: &[(&str, &str)] = &[
         "allow",
         "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent without a check of its spectrum",
     ),
-    ("normalise", "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own)"),
+    (
+        "normalise",
+        "pair: scale pairs by the mean of 1/K_a and 1/K_b; none (default: the operator's own; projected: always done)",
+    ),
     (
         "mean",
         "of kappa between two particles: harmonic, arithmetic or geometric; fronts of kappa(T) into the cold need arithmetic, for the others are 0 where one kappa is (default harmonic; consistent: arithmetic)",
@@ -120,9 +123,11 @@ impl Choices {
         let positive = |v: f64| v > 0.0 && v.is_finite();
         let h_fac = words.number("h_fac", "h_fac must be positive", positive)?.unwrap_or(kernel.h_fac());
         let operator = table::find(words.take("operator").unwrap_or("brookshaw"))?;
+        let projected = matches!(operator.tensor, Tensor::Projected);
         let normalise = match words.take("normalise") {
             None => operator.normalise,
-            Some(word) => choice("normalise", word, &[("pair", true), ("none", false)])?,
+            // Projected weights start from pair-normalised ones; doing it once more would spoil them.
+            Some(word) => choice("normalise", word, &[("pair", true), ("none", false)])? && !projected,
         };
         let consistent = matches!(operator.tensor, Tensor::Consistent);
         // Σ w (k_a + k_b)/2 (T_b − T_a) = ½ (∇²(k T) + k ∇²T − T ∇²k) = ∇·(k ∇T): only this mean keeps the order.

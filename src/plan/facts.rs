@@ -30,8 +30,8 @@ pub struct Facts {
     pub tensor: bool,
     /// The operator takes a gradient and a divergence.
     pub twice: bool,
-    /// Weights of pairs are fitted particle by particle.
-    pub fitted: bool,
+    /// A weight depends on more than the row that it is in.
+    pub joined: bool,
     /// Weights differ from the two sides of a pair, and modes that grow are refused.
     pub one_sided: bool,
     /// The operator has no negative weight.

@@ -16,10 +16,6 @@ use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, tensor};
 use crate::space::{Cloud, density, rows::Rows};
 use std::borrow::Cow;
 
-/// K_a below which a particle counts as having too few neighbours for its weights to be normalised: scaling them up
-/// by more than this would make a lone pair as stiff as it is meaningless.
-const LEAST_MOMENT: f64 = 0.1;
-
 /// One block in this many is looked at to estimate the number of neighbours.
 const SAMPLE: usize = 16;
 
@@ -165,8 +161,12 @@ impl State {
         if self.inputs[fields::H] != Input::Unset {
             return self.each(fields::H);
         }
+        let h = |m: f64, rho: f64| self.choices.h_fac * (m / rho).powf(1.0 / nu);
+        if let (Input::Number(m), Input::Number(rho)) = (&self.inputs[fields::M], &self.inputs[fields::RHO]) {
+            return memory::filled("h", self.len(), h(*m, *rho));
+        }
         let (m, rho) = (self.each(fields::M)?, self.each(fields::RHO)?);
-        memory::collected("h", m.iter().zip(&rho).map(|(m, rho)| self.choices.h_fac * (m / rho).powf(1.0 / nu)))
+        memory::collected("h", m.iter().zip(&rho).map(|(m, rho)| h(*m, *rho)))
     }
 
     /// An input as an array; a number is repeated.
@@ -232,7 +232,7 @@ impl State {
         self.timers.add("weights", start.elapsed());
         if self.choices.normalise {
             let start = std::time::Instant::now();
-            self.normalise(&mut matrix, &moments)?;
+            matrix.normalise(&self.pool, &moments)?;
             self.timers.add("normalise", start.elapsed());
         }
         if let (Some(i), Some(cloud)) = (matrix.first_bad(&self.pool), &self.cloud) {
@@ -267,7 +267,7 @@ impl State {
         let operator = table::find("monotone")?;
         let fitted = |a: &Assembly| Assembly { operator, ..*a }.store(&self.pool);
         let (mut matrix, moments) = self.with_assembly(same_h, fitted)?;
-        self.normalise(&mut matrix, &moments)?;
+        matrix.normalise(&self.pool, &moments)?;
         Ok(matrix)
     }
 
@@ -276,13 +276,6 @@ impl State {
         let omega = self.with_rows(|rows| density::omega(&self.choices.kernel, rows, mass, &self.pool))?;
         let rho = self.geometry.as_ref().map_or(&[][..], |g| &g.rho);
         memory::collected("densities", omega.iter().zip(rho).map(|(omega, rho)| 1.0 / (omega * rho)))
-    }
-
-    /// Scales pairs by the mean of 1/K_a and 1/K_b.
-    fn normalise(&self, matrix: &mut Matrix, moments: &[f64]) -> Result<()> {
-        let inverse = memory::collected("normalisation", moments.iter().map(|&k| 1.0 / k.max(LEAST_MOMENT)))?;
-        matrix.scale(&self.pool, |a, b| 0.5 * (inverse[a] + inverse[b]));
-        Ok(())
     }
 
     fn refuse_what_does_not_fit(&self) -> Result<()> {
@@ -301,7 +294,8 @@ impl State {
         let kappa = if fold { self.each_kappa()? } else { Vec::new() };
         let (pool, mean) = (&self.pool, self.choices.mean);
         if let Some(weights) = self.weights.as_mut().filter(|w| fold && !w.folded) {
-            self.timers.time("fold", || weights.matrix.scale(pool, |a, b| mean.of(kappa[a], kappa[b])));
+            let kappa = &kappa[..];
+            self.timers.time("fold", || weights.matrix.scale(pool, move |a, b| mean.of(kappa[a], kappa[b])));
             weights.folded = true;
         }
         Ok(())

@@ -411,7 +411,7 @@ impl State {
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
             twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
             one_sided: matches!(choices.operator.tensor, Tensor::Consistent) && !choices.allow_unstable,
-            fitted: matches!(choices.operator.tensor, Tensor::Stencils),
+            joined: choices.operator.joins_rows(),
             positive,
             keeps_bounds: positive && strong_stability && !heated && exchanging == 0,
             operator: choices.operator.name,

@@ -103,7 +103,12 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
         }
         "first_moment" => {
             let same_h = geometry(state)?.same_h;
-            let found = state.with_assembly(same_h, |a| moments::first(a, &state.pool))?;
+            let joined = state.choices.operator.joins_rows();
+            if joined {
+                prepared(state)?;
+            }
+            let stored = state.weights.as_ref().filter(|_| joined).map(|w| &w.matrix);
+            let found = state.with_assembly(same_h, |a| moments::first(a, stored, &state.pool))?;
             return columns(&found, state.dim());
         }
         "grad_T" => return gradient_of_t(state),

@@ -38,19 +38,10 @@ impl Cells {
     /// Sorts particles with smoothing lengths `h` and kernel support `radius` (in h) into cells.
     pub fn new(cloud: &Cloud, h: &[f64], radius: f64, pool: &Pool) -> Result<Cells> {
         let (h_max, h_min) = (sum::max(pool, h.len(), |i| h[i]), sum::min(pool, h.len(), |i| h[i]));
-        let mut members: Vec<Vec<u32>> = Vec::new();
-        for (i, &hi) in h.iter().enumerate() {
-            let level = level_of(hi, h_max);
-            if members.len() <= level {
-                members.resize_with(level + 1, Vec::new);
-            }
-            let list = &mut members[level];
-            if list.len() == list.capacity() {
-                let more = list.len().max(64).min(h.len() - i);
-                list.try_reserve_exact(more).map_err(|_| memory::no_memory::<u32>("cell lists", more))?;
-            }
-            list.push(i as u32);
-        }
+        let members = match h_max == h_min {
+            true => vec![memory::collected("cell lists", 0..h.len() as u32)?],
+            false => by_level(h, h_max)?,
+        };
         let filled = members.into_iter().filter(|m| !m.is_empty());
         let levels: Result<Vec<Level>> = filled.map(|m| Level::new(cloud, h, radius, m)).collect();
         Ok(Cells { levels: levels?, h_max, same_h: h_max == h_min })
@@ -65,9 +56,27 @@ impl Cells {
     }
 }
 
+/// The particles of each level, in order.
+fn by_level(h: &[f64], h_max: f64) -> Result<Vec<Vec<u32>>> {
+    let mut members: Vec<Vec<u32>> = Vec::new();
+    for (i, &hi) in h.iter().enumerate() {
+        let level = level_of(hi, h_max);
+        if members.len() <= level {
+            members.resize_with(level + 1, Vec::new);
+        }
+        let list = &mut members[level];
+        if list.len() == list.capacity() {
+            let more = list.len().max(64).min(h.len() - i);
+            list.try_reserve_exact(more).map_err(|_| memory::no_memory::<u32>("cell lists", more))?;
+        }
+        list.push(i as u32);
+    }
+    Ok(members)
+}
+
 fn level_of(h: f64, h_max: f64) -> usize {
-    // 0 for equal lengths; a length of 0 ends on the last level.
-    ((h_max / h).log2() as usize).min(MAX_LEVEL)
+    // 0 for equal lengths, without a logarithm; a length of 0 ends on the last level.
+    if h == h_max { 0 } else { ((h_max / h).log2() as usize).min(MAX_LEVEL) }
 }
 
 impl Level {

@@ -113,11 +113,14 @@ impl<'a> Rows<'a> {
         while start < range.end {
             let group = group_of(start);
             let end = (start + 1..range.end).find(|&i| group_of(i) != group).unwrap_or(range.end);
-            let shifted = if (start..end).any(&wanted) { self.gather(start..end, s)? } else { false };
-            for i in (start..end).filter(|&i| wanted(i)) {
-                let centre: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
-                let reach = self.radius * self.h[i];
-                visit(s.near(i, centre, reach * reach, shifted)?);
+            if (start..end).any(&wanted) {
+                let shifted = self.gather(start..end, s)?;
+                // The group is in one cell, in order.
+                let first = s.place(start).unwrap_or_default();
+                for i in (start..end).filter(|&i| wanted(i)) {
+                    let centre: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
+                    visit(s.near(i, first + (i - start), centre, self.radius * self.h[i], shifted)?);
+                }
             }
             start = end;
         }
@@ -135,13 +138,7 @@ impl<'a> Rows<'a> {
         let lengths = (!same_h).then_some((self.h, self.radius));
         for level in &self.cells.levels {
             let reach = self.radius * h_group.max(level.h_max);
-            // Slack for rounding of the interval ends; the distance test below decides, and it is symmetric.
-            let pad = |x: f64| reach * (1.0 + 1e-9) + 4.0 * f64::EPSILON * x.abs();
-            let mut from = lo;
-            let mut to = hi;
-            for a in 0..dim {
-                (from[a], to[a]) = (lo[a] - pad(lo[a]), hi[a] + pad(hi[a]));
-            }
+            let (from, to) = self.around(lo, hi, reach);
             let wraps = (0..dim).any(|a| self.cloud.domain.images(a, from[a], to[a]) != (0..=0));
             if wraps && !shifted {
                 // So far no candidate was an image.
@@ -157,7 +154,20 @@ impl<'a> Rows<'a> {
                 });
             });
         }
-        failed.map(|()| shifted)
+        failed?;
+        let (from, to) = self.around(lo, hi, self.radius * self.cells.h_max);
+        s.settle(&self.cloud.domain, from, to)?;
+        Ok(shifted)
+    }
+
+    /// The box of all that is within reach of a box, with slack for rounding of its ends: the distance test decides, and it
+    /// is symmetric.
+    fn around(&self, mut lo: Axes<f64>, mut hi: Axes<f64>, reach: f64) -> (Axes<f64>, Axes<f64>) {
+        let pad = |x: f64| reach * (1.0 + 1e-9) + 4.0 * f64::EPSILON * x.abs();
+        for a in 0..self.cloud.dim() {
+            (lo[a], hi[a]) = (lo[a] - pad(lo[a]), hi[a] + pad(hi[a]));
+        }
+        (lo, hi)
     }
 
     fn extent(&self, group: Range<usize>) -> (Axes<f64>, Axes<f64>) {

@@ -1,6 +1,6 @@
 //! Who is near enough: candidates collected from cells, and those within reach picked out, for one particle at a time.
 
-use super::{Axes, Cloud};
+use super::{Axes, Cloud, Domain};
 use crate::error::Result;
 use crate::memory;
 
@@ -32,14 +32,84 @@ impl Row<'_> {
     }
 }
 
+/// Candidates sifted together.
+const LANES: usize = 8;
+
+/// What single precision may be wrong by in a distance between two places in the search box, in lengths of the box, with
+/// room to spare: coordinates and their differences are rounded by 2^-25 at most, squares and their sum by 2^-23.
+const SLACK: f64 = 1e-6;
+
+/// The lanes whose bits are set in a mask, first to last, then zeros.
+const PACKED: [[u8; LANES]; 1 << LANES] = {
+    let mut all = [[0; LANES]; 1 << LANES];
+    let mut mask = 0;
+    while mask < all.len() {
+        let (mut lane, mut found) = (0, 0);
+        while lane < LANES {
+            if mask >> lane & 1 == 1 {
+                all[mask][found] = lane as u8;
+                found += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    all
+};
+
+/// Bit k says whether a[k] < b[k]. `AVX2`: the processor has it.
+#[inline(always)]
+fn less<const AVX2: bool>(a: &[f32; LANES], b: &[f32; LANES]) -> usize {
+    #[cfg(target_arch = "x86_64")]
+    if AVX2 {
+        // SAFETY: as the caller says.
+        return unsafe { less_avx2(a, b) };
+    }
+    (0..LANES).map(|k| usize::from(a[k] < b[k]) << k).sum()
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+fn less_avx2(a: &[f32; LANES], b: &[f32; LANES]) -> usize {
+    use std::arch::x86_64::{_CMP_LT_OQ, _mm256_cmp_ps, _mm256_loadu_ps, _mm256_movemask_ps};
+    // SAFETY: both are as long as a register.
+    let (a, b) = unsafe { (_mm256_loadu_ps(a.as_ptr()), _mm256_loadu_ps(b.as_ptr())) };
+    _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_LT_OQ>(a, b)) as usize
+}
+
+/// The square of a reach in single precision, and enough more that no particle within it is lost.
+fn generous(reach: f64, slack: f64) -> f32 {
+    ((reach + slack).powi(2) * (1.0 + 1e-6)) as f32
+}
+
+/// Picks from an array.
+#[inline(always)]
+fn take<T: Copy>(to: &mut [T], from: &[T], places: &[u32]) {
+    for (to, &c) in to.iter_mut().zip(places) {
+        debug_assert!((c as usize) < from.len());
+        // SAFETY: a hit is a candidate, and every array has a value for each.
+        *to = unsafe { *from.get_unchecked(c as usize) };
+    }
+}
+
 /// Buffers of one worker, reused from row to row.
+///
+/// Candidates are sifted in single precision, in units of the search box, with a little more reach than they have: half
+/// the work for all, and the few that pass are tested exactly.
 #[derive(Default)]
 pub struct Scratch {
     j: Vec<u32>,
     x: Axes<Vec<f64>>,
     shift: Axes<Vec<f64>>,
-    cut2: Vec<f64>,
-    r2: Vec<f64>,
+    /// R h of each candidate, where they differ.
+    reach: Vec<f64>,
+    origin: Axes<f64>,
+    /// 1 / length of the search box.
+    scale: f64,
+    slack: f64,
+    /// The candidates' places in the box.
+    sieve: Axes<Vec<f32>>,
+    sieve_cut2: Vec<f32>,
     hits: Vec<u32>,
     row_j: Vec<u32>,
     row_r: Vec<f64>,
@@ -47,101 +117,187 @@ pub struct Scratch {
 }
 
 impl Scratch {
-    /// The row of particle i at `centre`: candidates with r² < max(own, cut2), `shifted` where some are images.
+    /// The row of particle i at `centre`: candidates with r < max(reach, theirs), `shifted` where some are images.
+    /// `itself`: which candidate particle i is; its images are others.
     ///
     /// # Errors
     /// `NoMemory`.
-    pub fn near<const D: usize>(&mut self, i: usize, centre: [f64; D], own: f64, shifted: bool) -> Result<Row<'_>> {
+    pub fn near<const D: usize>(
+        &mut self,
+        i: usize,
+        itself: usize,
+        centre: [f64; D],
+        reach: f64,
+        shifted: bool,
+    ) -> Result<Row<'_>> {
+        debug_assert!(self.j[itself] as usize == i);
         self.reserve_row(self.j.len(), D)?;
-        let n = if shifted { self.pick::<D, true>(i, centre, own) } else { self.pick::<D, false>(i, centre, own) };
+        let n = match shifted {
+            true => self.pick::<D, true>(itself, centre, reach),
+            false => self.pick::<D, false>(itself, centre, reach),
+        };
         let d = [0, 1, 2].map(|a| if a < D { &self.row_d[a][..n] } else { &[] });
         Ok(Row { i, j: &self.row_j[..n], r: &self.row_r[..n], d })
     }
 
-    fn pick<const D: usize, const SHIFTED: bool>(&mut self, i: usize, centre: [f64; D], own: f64) -> usize {
+    /// Which candidate is a particle that is no image.
+    pub fn place(&self, i: usize) -> Option<usize> {
+        let here = |c: &usize| self.shift.iter().all(|shift| shift.get(*c).is_none_or(|s| *s == 0.0));
+        let candidates = self.j.iter().enumerate().filter(|(_, j)| **j as usize == i);
+        candidates.map(|(c, _)| c).find(here)
+    }
+
+    fn pick<const D: usize, const SHIFTED: bool>(&mut self, itself: usize, centre: [f64; D], reach: f64) -> usize {
         #[cfg(target_arch = "x86_64")]
-        if is_x86_feature_detected!("avx2") {
-            // SAFETY: this processor has AVX2.
-            return unsafe { self.select_avx2::<D, SHIFTED>(i, centre, own) };
+        if is_x86_feature_detected!("avx2") && is_x86_feature_detected!("popcnt") {
+            // SAFETY: this processor has both.
+            return unsafe { self.select_avx2::<D, SHIFTED>(itself, centre, reach) };
         }
-        self.select::<D, SHIFTED>(i, centre, own)
+        self.select::<D, SHIFTED, false>(itself, centre, reach)
     }
 
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
-    fn select_avx2<const D: usize, const SHIFTED: bool>(&mut self, i: usize, centre: [f64; D], own: f64) -> usize {
-        self.select::<D, SHIFTED>(i, centre, own)
+    #[target_feature(enable = "avx2,popcnt")]
+    fn select_avx2<const D: usize, const SHIFTED: bool>(
+        &mut self,
+        itself: usize,
+        centre: [f64; D],
+        reach: f64,
+    ) -> usize {
+        self.select::<D, SHIFTED, true>(itself, centre, reach)
     }
 
-    /// Moves the candidates with r² < max(own, cut2) into the row. No closures here: they would be compiled once,
-    /// without the caller's processor features.
+    /// Makes the row and answers its length. No closures from here on: they would be compiled once, without the caller's
+    /// processor features.
     #[inline(always)]
-    fn select<const D: usize, const SHIFTED: bool>(&mut self, i: usize, centre: [f64; D], own: f64) -> usize {
-        let (n, same_h) = (self.j.len(), self.cut2.is_empty());
-        let (r2, hits) = (&mut self.r2[..n], &mut self.hits[..n]);
-        r2.fill(0.0);
-        for (a, centre) in centre.iter().enumerate() {
-            let x = &self.x[a][..n];
-            if SHIFTED {
-                for ((r2, x), shift) in r2.iter_mut().zip(x).zip(&self.shift[a][..n]) {
-                    let d = (x - centre) + shift;
-                    *r2 += d * d;
-                }
-            } else {
-                for (r2, x) in r2.iter_mut().zip(x) {
-                    let d = x - centre;
-                    *r2 += d * d;
-                }
-            }
+    fn select<const D: usize, const SHIFTED: bool, const AVX2: bool>(
+        &mut self,
+        itself: usize,
+        centre: [f64; D],
+        reach: f64,
+    ) -> usize {
+        let found = match self.reach.is_empty() {
+            true => self.sift::<D, true, AVX2>(itself, &centre, reach),
+            false => self.sift::<D, false, AVX2>(itself, &centre, reach),
+        };
+        let mut passed = self.fill_row::<D, SHIFTED>(&centre, found);
+        if !self.all_within(reach, passed) {
+            passed = self.keep_within(reach, passed);
+            self.fill_row::<D, SHIFTED>(&centre, passed);
         }
-        // Every candidate is written, and the end moves on only for a hit: no branch to mispredict.
-        let mut found = 0;
-        for (c, r2) in r2.iter().enumerate() {
-            let cut2 = if same_h { own } else { own.max(self.cut2[c]) };
-            // SAFETY: found <= c < n, the length of hits.
-            unsafe { *hits.get_unchecked_mut(found) = c as u32 };
-            found += usize::from(*r2 < cut2);
-        }
-        self.fill_row::<D, SHIFTED>(i, centre, found)
-    }
-
-    #[inline(always)]
-    fn fill_row<const D: usize, const SHIFTED: bool>(&mut self, i: usize, centre: [f64; D], found: usize) -> usize {
-        let mut len = 0;
-        for k in 0..found {
-            // The particle itself is a candidate too, but not its own neighbour; its images are.
-            let c = self.hits[k] as usize;
-            let mut here = self.j[c] as usize == i;
-            for a in 0..D {
-                here &= !SHIFTED || self.shift[a][c] == 0.0;
-            }
-            self.hits[len] = c as u32;
-            len += usize::from(!here);
-        }
-        let hits = &self.hits[..len];
-        for (j, &c) in self.row_j[..len].iter_mut().zip(hits) {
-            *j = self.j[c as usize];
-        }
-        for (r, &c) in self.row_r[..len].iter_mut().zip(hits) {
-            *r = self.r2[c as usize];
-        }
-        for r in &mut self.row_r[..len] {
+        for r in &mut self.row_r[..passed] {
             *r = r.sqrt();
         }
+        passed
+    }
+
+    /// Fills hits with the candidates that may be within reach; answers how many.
+    #[inline(always)]
+    fn sift<const D: usize, const SAME_H: bool, const AVX2: bool>(
+        &mut self,
+        itself: usize,
+        centre: &[f64; D],
+        reach: f64,
+    ) -> usize {
+        let mut own = [0.0f32; D];
+        for a in 0..D {
+            own[a] = ((centre[a] - self.origin[a]) * self.scale) as f32;
+        }
+        let own_cut2 = generous(reach * self.scale, self.slack);
+        let mut x: [&[[f32; LANES]]; D] = [&[]; D];
+        for (x, sieve) in x.iter_mut().zip(&self.sieve) {
+            *x = &sieve.as_chunks().0[..self.sieve[0].len() / LANES];
+        }
+        let all_theirs = self.sieve_cut2.as_chunks::<LANES>().0;
+        let mut found = 0;
+        for c in 0..x[0].len() {
+            let mut near = [0.0; LANES];
+            for a in 0..D {
+                for k in 0..LANES {
+                    near[k] += (x[a][c][k] - own[a]) * (x[a][c][k] - own[a]);
+                }
+            }
+            let mut cut2 = [own_cut2; LANES];
+            if !SAME_H {
+                let theirs = &all_theirs[c];
+                for k in 0..LANES {
+                    cut2[k] = if theirs[k] > own_cut2 { theirs[k] } else { own_cut2 };
+                }
+            }
+            let mut mask = less::<AVX2>(&near, &cut2);
+            if c == itself / LANES {
+                mask &= !(1 << (itself % LANES));
+            }
+            // All lanes are written, and the end moves on by the hits alone: no branch to mispredict.
+            for (hit, &lane) in self.hits[found..found + LANES].iter_mut().zip(&PACKED[mask]) {
+                *hit = (c * LANES) as u32 + u32::from(lane);
+            }
+            found += mask.count_ones() as usize;
+        }
+        found
+    }
+
+    /// The row of the first `found` hits, with r² in place of r.
+    #[inline(always)]
+    fn fill_row<const D: usize, const SHIFTED: bool>(&mut self, centre: &[f64; D], found: usize) -> usize {
+        let (hits, r2) = (&self.hits[..found], &mut self.row_r[..found]);
+        take(&mut self.row_j[..found], &self.j, hits);
+        r2.fill(0.0);
         for (a, centre) in centre.iter().enumerate() {
-            let (x, shift) = (&self.x[a], &self.shift[a]);
-            for (d, &c) in self.row_d[a][..len].iter_mut().zip(hits) {
-                let apart = x[c as usize] - centre;
-                *d = if SHIFTED { apart + shift[c as usize] } else { apart };
+            let row = &mut self.row_d[a][..found];
+            take(row, &self.x[a], hits);
+            for d in &mut *row {
+                *d -= centre;
+            }
+            if SHIFTED {
+                let shift = &self.shift[a][..self.j.len()];
+                for (d, &c) in row.iter_mut().zip(hits) {
+                    *d += shift[c as usize];
+                }
+            }
+            for (r2, d) in r2.iter_mut().zip(&*row) {
+                *r2 += d * d;
             }
         }
-        len
+        found
+    }
+
+    /// Whether the whole row is within reach.
+    #[inline(always)]
+    fn all_within(&self, reach: f64, found: usize) -> bool {
+        let own = reach * reach;
+        let mut all = true;
+        if self.reach.is_empty() {
+            for r2 in &self.row_r[..found] {
+                all &= *r2 < own;
+            }
+        } else {
+            for (r2, &c) in self.row_r[..found].iter().zip(&self.hits) {
+                all &= *r2 < own.max(self.reach[c as usize].powi(2));
+            }
+        }
+        all
+    }
+
+    /// Drops the hits of the row that are not within reach; answers how many are left.
+    fn keep_within(&mut self, reach: f64, found: usize) -> usize {
+        let own = reach * reach;
+        let mut left = 0;
+        for k in 0..found {
+            let c = self.hits[k] as usize;
+            let theirs = self.reach.get(c).map_or(0.0, |reach| reach.powi(2));
+            if self.row_r[k] < own.max(theirs) {
+                self.hits[left] = c as u32;
+                left += 1;
+            }
+        }
+        left
     }
 
     /// Forgets all candidates.
     pub fn clear(&mut self) {
         self.j.clear();
-        self.cut2.clear();
+        self.reach.clear();
         self.x.iter_mut().chain(&mut self.shift).for_each(Vec::clear);
     }
 
@@ -167,33 +323,65 @@ impl Scratch {
         let failed = |_| memory::no_memory::<f64>("neighbour candidates", cell.len());
         self.j.try_reserve(cell.len()).map_err(failed)?;
         self.j.extend_from_slice(cell);
+        // Where all particles are on one level, those of a cell are one after the other.
+        let run = cell.first().zip(cell.last()).map(|(&first, &last)| first as usize..last as usize + 1);
         for (a, x) in self.x.iter_mut().enumerate().take(cloud.dim()) {
             x.try_reserve(cell.len()).map_err(failed)?;
-            x.extend(cell.iter().map(|&j| cloud.x[a][j as usize]));
+            match &run {
+                Some(run) if run.len() == cell.len() => x.extend_from_slice(&cloud.x[a][run.clone()]),
+                _ => x.extend(cell.iter().map(|&j| cloud.x[a][j as usize])),
+            }
         }
         for (all, by) in self.shift.iter_mut().zip(shift.iter().flatten()) {
             all.try_reserve(cell.len()).map_err(failed)?;
             all.resize(all.len() + cell.len(), *by);
         }
         if let Some((h, radius)) = lengths {
-            self.cut2.try_reserve(cell.len()).map_err(failed)?;
-            self.cut2.extend(cell.iter().map(|&j| (radius * h[j as usize]).powi(2)));
+            self.reach.try_reserve(cell.len()).map_err(failed)?;
+            self.reach.extend(cell.iter().map(|&j| radius * h[j as usize]));
+        }
+        Ok(())
+    }
+
+    /// Makes the sieve, when all candidates are there, for rows within a box.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn settle(&mut self, domain: &Domain, from: Axes<f64>, to: Axes<f64>) -> Result<()> {
+        let (mut size, mut magnitude) = (0.0f64, 0.0f64);
+        for (a, (from, to)) in from.iter().zip(&to).enumerate().take(domain.dim) {
+            size = size.max(to - from);
+            magnitude = magnitude.max(from.abs()).max(to.abs());
+            magnitude = if domain.periodic[a] { magnitude.max(domain.length(a)) } else { magnitude };
+        }
+        (self.origin, self.scale) = (from, 1.0 / size);
+        self.slack = SLACK + 8.0 * f64::EPSILON * magnitude * self.scale;
+        let (what, n) = ("neighbour candidates", self.j.len());
+        let padded = n.next_multiple_of(LANES);
+        for (a, origin) in from.into_iter().enumerate().take(domain.dim) {
+            let (shift, sieve, scale) = (&self.shift[a], &mut self.sieve[a], self.scale);
+            sieve.clear();
+            memory::extended(what, sieve, padded, f32::INFINITY)?;
+            let places = sieve.iter_mut().zip(&self.x[a]);
+            match shift.is_empty() {
+                true => places.for_each(|(s, x)| *s = ((x - origin) * scale) as f32),
+                false => places.zip(shift).for_each(|((s, x), by)| *s = (((x - origin) + by) * scale) as f32),
+            }
+        }
+        self.sieve_cut2.clear();
+        if !self.reach.is_empty() {
+            memory::extended(what, &mut self.sieve_cut2, padded, 0.0)?;
+            let theirs = self.sieve_cut2.iter_mut().zip(&self.reach);
+            theirs.for_each(|(cut2, reach)| *cut2 = generous(reach * self.scale, self.slack));
         }
         Ok(())
     }
 
     fn reserve_row(&mut self, n: usize, dim: usize) -> Result<()> {
-        fn grow<T: Clone + Default>(v: &mut Vec<T>, n: usize) -> Result<()> {
-            if n > v.len() {
-                v.try_reserve(n - v.len()).map_err(|_| memory::no_memory::<T>("a row of neighbours", n))?;
-                v.resize(n, T::default());
-            }
-            Ok(())
-        }
-        grow(&mut self.r2, n)?;
-        grow(&mut self.hits, n)?;
-        grow(&mut self.row_j, n)?;
-        grow(&mut self.row_r, n)?;
-        self.row_d.iter_mut().take(dim).try_for_each(|d| grow(d, n))
+        let what = "a row of neighbours";
+        memory::extended(what, &mut self.hits, n + LANES, 0)?;
+        memory::extended(what, &mut self.row_j, n, 0)?;
+        memory::extended(what, &mut self.row_r, n, 0.0)?;
+        self.row_d.iter_mut().take(dim).try_for_each(|d| memory::extended(what, d, n, 0.0))
     }
 }
