@@ -9,7 +9,7 @@ const MISSING: &[&str] = &["model radiation", "model dust"];
 
 #[test]
 fn nothing_fails_that_should_pass_and_what_should_fail_does() {
-    let (rows, _) = stability::run(&stability::cases(), 1, Box::new(|_| true));
+    let (rows, _) = stability::run(&stability::cases(), 1, Box::new(|_| true)).unwrap();
     let wrong: Vec<&Row> = rows.iter().filter(|r| !r.verdict.is_right()).collect();
     assert!(wrong.is_empty(), "{wrong:#?}");
     let absent = rows.iter().filter(|r| r.verdict == Verdict::Absent && r.words.is_empty());

@@ -140,18 +140,22 @@ impl Fit<'_> {
     #[inline(always)]
     fn moments<const D: usize, const N: usize>(&self, degree: usize, w: &[f64]) -> [f64; N] {
         let mut sums = [[0.0; LANES]; N];
-        for at in (0..w.len()).step_by(LANES) {
-            let powers = self.powers::<D>(degree, at);
-            let own = times(lanes(w, at), [1.0 / self.largest; LANES]);
+        let scale = [1.0 / self.largest; LANES];
+        // Two groups at once: half as many sums are loaded and stored.
+        for at in (0..w.len()).step_by(2 * LANES) {
+            let (p, q) = (self.powers::<D>(degree, at), self.powers::<D>(degree, at + LANES));
+            let (own_p, own_q) = (times(lanes(w, at), scale), times(lanes(w, at + LANES), scale));
             let mut m = 0;
             for i in 0..=degree {
-                let x = times(own, powers[0][i]);
+                let (x_p, x_q) = (times(own_p, p[0][i]), times(own_q, q[0][i]));
                 for j in 0..=if D > 1 { degree - i } else { 0 } {
-                    let xy = times(x, powers[1][j]);
-                    for z in &powers[2][..=if D > 2 { degree - i - j } else { 0 }] {
-                        add(&mut sums[m], times(xy, *z));
-                        m += 1;
+                    let (xy_p, xy_q) = (times(x_p, p[1][j]), times(x_q, q[1][j]));
+                    let last = if D > 2 { degree - i - j } else { 0 };
+                    for ((z_p, z_q), sum) in p[2][..=last].iter().zip(&q[2][..=last]).zip(&mut sums[m..=m + last]) {
+                        add(sum, times(xy_p, *z_p));
+                        add(sum, times(xy_q, *z_q));
                     }
+                    m += last + 1;
                 }
             }
         }
@@ -168,13 +172,14 @@ impl Fit<'_> {
             let mut m = 0;
             for i in 0..=degree {
                 for j in 0..=if D > 1 { degree - i } else { 0 } {
-                    let xy = times(powers[0][i], powers[1][j]);
+                    let mut along_z = [0.0; LANES];
                     for z in &powers[2][..=if D > 2 { degree - i - j } else { 0 }] {
                         if m > 0 {
-                            add(&mut sums, times([c[m - 1]; LANES], times(xy, *z)));
+                            add(&mut along_z, times([c[m - 1]; LANES], *z));
                         }
                         m += 1;
                     }
+                    add(&mut sums, times(times(powers[0][i], powers[1][j]), along_z));
                 }
             }
             factor[at..].iter_mut().zip(sums).for_each(|(factor, sum)| *factor = sum / self.largest);
@@ -198,9 +203,12 @@ impl Fit<'_> {
 /// The values from `at` on; zeros beyond the end.
 #[inline(always)]
 fn lanes(values: &[f64], at: usize) -> Lanes {
+    let rest = values.get(at..).unwrap_or_default();
+    if let Some(whole) = rest.first_chunk() {
+        return *whole;
+    }
     let mut out = [0.0; LANES];
-    let end = values.len().min(at + LANES);
-    out[..end - at].copy_from_slice(&values[at..end]);
+    out.iter_mut().zip(rest).for_each(|(out, value)| *out = *value);
     out
 }
 

@@ -22,11 +22,15 @@ struct Rows {
 }
 
 /// The rows of a block as they are made: terms of the same column are added up, in the order in which they come.
+///
+/// Terms are counted on from block to block, so that a number tells whether it belongs to the present row.
 #[derive(Default)]
 pub struct Gather {
-    /// Where a column was met last; true only if that place is in the present row and has that column.
+    /// The number of the term in which a column was met last; 0 where it never was.
     place: Vec<u32>,
-    begin: usize,
+    /// Numbers of the first terms of this block and of this row.
+    base: u32,
+    begin: u32,
     start: Vec<u32>,
     col: Vec<u32>,
     coef: Vec<f64>,
@@ -35,10 +39,17 @@ pub struct Gather {
 
 impl Gather {
     fn begin(&mut self, columns: usize) -> Result<()> {
+        let next = self.base as usize + self.col.len();
         if self.place.len() != columns {
             self.place = memory::filled("places of columns", columns, 0)?;
         }
-        (self.begin, self.full) = (0, false);
+        // No block has more terms than half of all numbers; when those run out, all columns are forgotten.
+        self.base = next.max(1) as u32;
+        if next > u32::MAX as usize / 2 {
+            self.place.fill(0);
+            self.base = 1;
+        }
+        (self.begin, self.full) = (self.base, false);
         self.start.clear();
         self.col.clear();
         self.coef.clear();
@@ -47,28 +58,38 @@ impl Gather {
         Ok(())
     }
 
-    #[inline]
+    #[inline(always)]
     pub fn add(&mut self, column: u32, value: f64) {
-        let at = self.place[column as usize] as usize;
-        if at >= self.begin && self.col.get(at) == Some(&column) {
-            return self.coef[at] += value;
+        let number = self.place[column as usize];
+        if number >= self.begin {
+            self.coef[(number - self.base) as usize] += value;
+        } else {
+            self.push(column, value);
         }
+    }
+
+    #[inline]
+    fn push(&mut self, column: u32, value: f64) {
         let at = self.col.len();
-        if at == self.col.capacity() && (self.col.try_reserve(1).is_err() || self.coef.try_reserve(at + 1).is_err()) {
+        let room = at < self.col.capacity() && at < self.coef.capacity();
+        if !room && (self.col.try_reserve(1).is_err() || self.coef.try_reserve(1).is_err()) {
             return self.full = true;
         }
-        self.place[column as usize] = at as u32;
+        if at >= u32::MAX as usize / 2 {
+            return self.full = true;
+        }
+        self.place[column as usize] = self.base + at as u32;
         self.col.push(column);
         self.coef.push(value);
     }
 
     fn end_row(&mut self) {
-        self.begin = self.col.len();
-        self.start.push(self.begin as u32);
+        self.begin = self.base + self.col.len() as u32;
+        self.start.push(self.col.len() as u32);
     }
 
     fn rows(&self) -> Result<Rows> {
-        if self.full || self.col.len() > u32::MAX as usize {
+        if self.full {
             return Err(memory::no_memory::<(u32, f64)>("a coarse level", self.col.len()));
         }
         let start = memory::copied("a coarse level", &self.start)?;

@@ -16,7 +16,7 @@ use std::f64::consts::PI;
 use std::time::Duration;
 
 /// Operators for a scalar kappa that can win somewhere: the positive pair forms, and the consistent ones.
-const OPERATORS: [&str; 4] = ["brookshaw", "kernel", "consistent order=2", "consistent order=4"];
+const OPERATORS: [&str; 5] = ["brookshaw", "kernel", "projected", "consistent order=2", "consistent order=4"];
 const KERNELS: [&str; 4] = ["M4", "M6", "C2", "C4"];
 /// In units of a kernel's default.
 const H_FACS: [f64; 2] = [1.0, 1.25];

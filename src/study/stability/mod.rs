@@ -31,6 +31,7 @@ mod table;
 mod time;
 mod trial;
 
+use super::batch;
 use super::catalogue::{Answer, Request};
 use super::run::Watch;
 use crate::error::Result;
@@ -74,17 +75,16 @@ pub fn cases() -> Vec<&'static Case> {
 
 /// Tries every case with all its words, until `watch` says no; whether it came to the end is the second answer. `scale`
 /// multiplies the number of particles along each axis.
-pub fn run(cases: &[&Case], scale: usize, mut watch: Watch) -> (Vec<Row>, bool) {
+///
+/// # Errors
+/// Where no threads can be had.
+pub fn run(cases: &[&Case], scale: usize, mut watch: Watch) -> Result<(Vec<Row>, bool)> {
     let todo: Vec<(&Case, Trial)> =
         cases.iter().flat_map(|case| (case.trials)().into_iter().map(|t| (*case, t))).collect();
-    let mut rows = Vec::new();
-    for (case, trial) in &todo {
-        if !watch(rows.len() as f64 / todo.len() as f64) {
-            return (rows, false);
-        }
-        rows.push(Row::new(case, trial, attempt(case, trial, scale)));
-    }
-    (rows, true)
+    let row = |(case, trial): &(&Case, Trial)| Ok(Row::new(case, trial, attempt(case, trial, scale)));
+    let rows = batch::map(&todo, row, |done| watch(done as f64 / todo.len() as f64))?;
+    let complete = rows.len() == todo.len();
+    Ok((rows, complete))
 }
 
 /// What was seen; none where the words are not known yet.
@@ -111,7 +111,7 @@ fn attempt(case: &Case, trial: &Trial, scale: usize) -> Option<Seen> {
 /// # Errors
 /// As [`table::answer`].
 pub fn answer(request: Request) -> Result<Answer> {
-    let (rows, complete) = run(&cases(), if request.full { 2 } else { 1 }, request.watch);
+    let (rows, complete) = run(&cases(), if request.full { 2 } else { 1 }, request.watch)?;
     Ok(Answer { stopped: !complete, ..table::answer(&rows)? })
 }
 
