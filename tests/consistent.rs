@@ -31,15 +31,9 @@ fn polynomials_are_exact_on_any_particles() {
     }
 }
 
-/// Relative error of a mode after it has decayed by e on jittered particles in the periodic box.
+/// The error on jittered particles.
 fn error(words: &str, n: usize, dim: usize, jitter: f64) -> f64 {
-    let x = lattice(n, dim, jitter);
-    let mut s = unit_box(words, &x, dim, true);
-    let mode = field(&x, dim, |p| p.iter().map(|x| (2.0 * PI * x).sin()).product());
-    set(&mut s, "T", &mode);
-    s.step(1.0 / (4.0 * PI * PI * dim as f64)).unwrap();
-    let exact: Vec<f64> = mode.iter().map(|m| m * (-1.0f64).exp()).collect();
-    l2(&s.get_all("T").unwrap(), &exact)
+    mode_error(words, &lattice(n, dim, jitter), dim)
 }
 
 #[test]

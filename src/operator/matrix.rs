@@ -40,8 +40,7 @@ pub struct Seen(Vec<bool>);
 impl Seen {
     fn touched(&mut self, n: usize, col: &[u32]) -> Result<Vec<u32>> {
         let blocks = n.div_ceil(BLOCK);
-        self.0.try_reserve(blocks).map_err(|_| memory::no_memory::<bool>("block list", blocks))?;
-        self.0.resize(blocks, false);
+        memory::extended("block list", &mut self.0, blocks, false)?;
         // Noted without looking, and looked at once: a branch for each pair would cost more.
         col.iter().for_each(|&j| self.0[j as usize / BLOCK] = true);
         // The sums do not look again whether a neighbour exists.

@@ -190,10 +190,7 @@ struct Workspace {
 impl Buffers {
     fn reserve(&mut self, n: usize) -> Result<()> {
         for v in [&mut self.q, &mut self.w, &mut self.other, &mut self.spare] {
-            if v.len() < n {
-                v.try_reserve(n - v.len()).map_err(|_| memory::no_memory::<f64>("a row of weights", n))?;
-                v.resize(n, 0.0);
-            }
+            memory::extended("a row of weights", v, n, 0.0)?;
         }
         Ok(())
     }

@@ -180,9 +180,10 @@ impl Scratch {
             true => self.sift::<D, true, AVX2>(itself, &centre, reach),
             false => self.sift::<D, false, AVX2>(itself, &centre, reach),
         };
-        let mut passed = self.fill_row::<D, SHIFTED>(&centre, found);
-        if !self.all_within(reach, passed) {
-            passed = self.keep_within(reach, passed);
+        self.fill_row::<D, SHIFTED>(&centre, found);
+        let mut passed = found;
+        if !self.all_within(reach, found) {
+            passed = self.keep_within(reach, found);
             self.fill_row::<D, SHIFTED>(&centre, passed);
         }
         for r in &mut self.row_r[..passed] {
@@ -237,9 +238,9 @@ impl Scratch {
         found
     }
 
-    /// The row of the first `found` hits, with r² in place of r.
+    /// Makes the row of the first `found` hits, with r² in place of r.
     #[inline(always)]
-    fn fill_row<const D: usize, const SHIFTED: bool>(&mut self, centre: &[f64; D], found: usize) -> usize {
+    fn fill_row<const D: usize, const SHIFTED: bool>(&mut self, centre: &[f64; D], found: usize) {
         let (hits, r2) = (&self.hits[..found], &mut self.row_r[..found]);
         take(&mut self.row_j[..found], &self.j, hits);
         r2.fill(0.0);
@@ -259,7 +260,6 @@ impl Scratch {
                 *r2 += d * d;
             }
         }
-        found
     }
 
     /// Whether the whole row is within reach.

@@ -2,6 +2,7 @@
 #![allow(dead_code)] // Each test binary uses its own part of this.
 
 use diffusph::{Solver, Strided};
+use std::f64::consts::PI;
 
 /// A linear congruential generator: the same particles on every machine.
 pub struct Random(pub u64);
@@ -50,6 +51,16 @@ pub fn l2(a: &[f64], b: &[f64]) -> f64 {
     let (difference, size): (f64, f64) =
         a.iter().zip(b).fold((0.0, 0.0), |(d, s), (a, b)| (d + (a - b) * (a - b), s + b * b));
     (difference / size).sqrt()
+}
+
+/// Relative error of a mode in the periodic unit box after it has decayed by e.
+pub fn mode_error(words: &str, x: &[f64], dim: usize) -> f64 {
+    let mut s = unit_box(words, x, dim, true);
+    let mode = field(x, dim, |p| p.iter().map(|x| (2.0 * PI * x).sin()).product());
+    set(&mut s, "T", &mode);
+    s.step(1.0 / (4.0 * PI * PI * dim as f64)).unwrap();
+    let exact: Vec<f64> = mode.iter().map(|m| m * (-1.0f64).exp()).collect();
+    l2(&s.get_all("T").unwrap(), &exact)
 }
 
 pub fn bits(values: &[f64]) -> Vec<u64> {
