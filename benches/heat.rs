@@ -22,6 +22,7 @@ fn main() {
     if std::env::args().any(|a| a == "--bench") {
         table(if full { &[22, 50, 100, 159] } else { &[22, 50] });
         stiff(30);
+        consistent(46);
     }
 }
 
@@ -176,6 +177,25 @@ fn stiff(n: usize) {
             euler.1 / rkl2.1,
             r.sqrt() / 2.0
         );
+    }
+}
+
+/// Neighbours and the weights of a fit around every particle, beside steps with these weights.
+fn consistent(n: usize) {
+    println!("\n consistent order threads  set-up us/particle  in steps");
+    for (order, threads) in [(2, 1), (2, 2), (4, 1), (4, 2)] {
+        let mut item = Item::with(n, &format!("integrator=euler operator=consistent order={order} threads={threads}"));
+        item.step(1);
+        let rounds = (0..5).map(|_| {
+            let step = item.step(30);
+            let set_up = item.set_up();
+            // The first step checks the spectrum and finds bounds.
+            item.step(1);
+            (step, set_up)
+        });
+        let (steps, set_ups): (Vec<_>, Vec<_>) = rounds.unzip();
+        let (step, set_up) = (median(steps), median(set_ups));
+        println!("{order:17} {threads:7} {:19.2} {:9.0}", set_up / (n * n * n) as f64 * 1e6, set_up / step);
     }
 }
 

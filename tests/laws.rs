@@ -295,6 +295,22 @@ fn weights_that_do_not_fit_are_refused() {
 }
 
 #[test]
+fn what_making_weights_takes_counts_too() {
+    let x = lattice(10, 3, 0.2);
+    let step = |operator: &str| {
+        // Some 90 neighbours of each of 1000 particles: 1.1 MB for weights, 2.3 MB more to project them.
+        let mut s = unit_box(&format!("kernel=M4 operator={operator} memory=2e6"), &x, 3, true);
+        s.set_number("T", 1.0).unwrap();
+        let plan = s.plan().unwrap().to_string();
+        assert_eq!(plan.contains(" project "), operator == "projected", "{plan}");
+        s.step(1e-6).map(drop)
+    };
+    step("brookshaw").unwrap();
+    let e = step("projected").unwrap_err();
+    assert!(e.name() == "NO_MEMORY", "{e}");
+}
+
+#[test]
 fn density_follows_moving_particles() {
     // The lengths found last are a start, not an answer: after a move the answer is that of a new solver.
     let x = lattice(12, 3, 0.3);

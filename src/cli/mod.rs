@@ -58,7 +58,7 @@ enum Command {
         /// A .vtu, .vtp, .pvtu, .pvtp or legacy .vtk file
         file: PathBuf,
     },
-    /// Measure what the library promises: stability, …; exit code 1 where something is not as it should be
+    /// Measure accuracy, cost or stability ('list studies' shows how); exit code 1 where something is not as it should be
     Study(study::StudyArgs),
 }
 

@@ -36,6 +36,12 @@ pub struct StudyArgs {
 pub fn run(args: &StudyArgs) -> Result<ExitCode> {
     let study = catalogue::find(&args.name)?;
     interrupt::listen();
+    if let Some(folder) = &args.out {
+        // Before the work, which may take minutes.
+        let failed =
+            |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
+        std::fs::create_dir_all(folder).map_err(failed)?;
+    }
     let answer =
         (study.run)(Request { full: args.full, tiny: args.tiny, scene: args.scene.clone(), watch: progress::watch() })?;
     let json =
@@ -51,8 +57,6 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode> {
 }
 
 fn write(folder: &Path, name: &str, answer: &Answer, json: &str) -> Result<()> {
-    let failed = |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
-    std::fs::create_dir_all(folder).map_err(failed)?;
     let own = [("txt", answer.text.as_str()), ("json", json)].map(|(ending, text)| (format!("{name}.{ending}"), text));
     let more = answer.files.iter().map(|(file, text)| (file.clone(), text.as_str()));
     own.into_iter()

@@ -31,6 +31,12 @@ pub fn read(mut file: File, path: &Path, whole: bool) -> Result<Snapshot> {
         "PUnstructuredGrid" | "PPolyData" if whole => parallel(grid, path),
         "PUnstructuredGrid" | "PPolyData" => Err(broken("a piece of a list is a list again")),
         "Collection" => Err(broken("it is a list of files; read one of those, or open it as a series")),
+        "vtkMultiBlockDataSet" | "vtkPartitionedDataSet" | "vtkPartitionedDataSetCollection" => {
+            Err(broken("it is a list of blocks; read the .vtu or .vtp of one of them"))
+        }
+        "ImageData" | "RectilinearGrid" | "PImageData" | "PRectilinearGrid" => {
+            Err(broken(format!("the points of a {kind} are not in the file; save it as an unstructured grid, .vtu")))
+        }
         // vtkio aborts the process on a forged compressed file, so it never sees one.
         _ if root.attributes().any(|a| a.name() == "compressor") => {
             Err(broken(format!("a compressed {kind} is not supported; re-save it without compression")))
@@ -269,5 +275,27 @@ fn in_array(array: Node, error: Error) -> Error {
     match error {
         Error::BadFile { path, reason } => Error::BadFile { path, reason: format!("array '{name}': {reason}") },
         other => in_file(Path::new(""), other),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn files_without_points_of_their_own_say_what_to_do() {
+        let dir = tempfile::tempdir().unwrap();
+        for (kind, advice) in [
+            ("ImageData", "save it as an unstructured grid"),
+            ("PRectilinearGrid", "save it as an unstructured grid"),
+            ("vtkMultiBlockDataSet", "read the .vtu or .vtp of one"),
+            ("StructuredGrid", "re-save it without compression"),
+            ("Collection", "open it as a series"),
+        ] {
+            let path = dir.path().join(kind);
+            let text =
+                format!("<VTKFile type=\"{kind}\" compressor=\"vtkLZ4DataCompressor\"><{kind}></{kind}></VTKFile>");
+            std::fs::write(&path, text).unwrap();
+            let e = super::super::read(&path).unwrap_err().to_string();
+            assert!(e.contains(advice) && e.contains(kind), "{e}");
+        }
     }
 }

@@ -40,6 +40,7 @@ pub struct Buffers {
     w: Vec<f64>,
     other: Vec<f64>,
     spare: Vec<f64>,
+    space: consistent::Space,
     /// That the last row's consistent weights reached.
     pub order: u32,
 }
@@ -49,7 +50,7 @@ impl Assembly<'_> {
     pub fn weights<'b>(&self, row: &Row, buffers: &'b mut Buffers) -> Result<&'b [f64]> {
         let n = row.len();
         buffers.reserve(n)?;
-        let Buffers { q, w, other, spare, order } = buffers;
+        let Buffers { q, w, other, spare, space, order } = buffers;
         let (q, w, other, spare) = (&mut q[..n], &mut w[..n], &mut other[..n], &mut spare[..n]);
         let power = self.kernel.dim() as i32 + 2;
         let h = self.rows.h;
@@ -59,7 +60,7 @@ impl Assembly<'_> {
         let scale = own.powi(power);
         w.iter_mut().for_each(|w| *w *= scale);
         if matches!(self.operator.tensor, Tensor::Consistent) {
-            *order = consistent::fit(self, row, w, spare);
+            *order = consistent::fit(self, row, w, space)?;
             return Ok(w);
         }
         if !self.same_h {

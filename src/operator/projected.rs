@@ -43,6 +43,13 @@ pub fn project(assembly: &Assembly, matrix: &mut Matrix, pool: &Pool) -> Result<
     }
 }
 
+/// Bytes that [`project`] takes while it lasts, for each pair and for each particle: offsets and marks; the vectors of the
+/// iterations and the blocks of the preconditioner.
+pub fn bytes(dim: usize) -> [f64; 2] {
+    let conditions = (dim + dim * (dim + 1) / 2) as f64;
+    [4.0 * dim as f64 + 1.0, 8.0 * conditions * (6.0 + conditions)]
+}
+
 fn project_in<const D: usize, const C: usize>(assembly: &Assembly, matrix: &mut Matrix, pool: &Pool) -> Result<()> {
     let n = matrix.len();
     let unit = sum::max(pool, n, |i| assembly.rows.h[i]);

@@ -1,5 +1,6 @@
 //! Every operator, a row each. Add an operator here.
 
+use super::projected;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 
@@ -171,6 +172,14 @@ impl Operator {
     /// Whether a weight depends on more than the row that it is in, so that all rows must be made before one is used.
     pub fn joins_rows(&self) -> bool {
         matches!(self.tensor, Tensor::Stencils | Tensor::Projected)
+    }
+
+    /// Bytes that making weights takes beside them while it lasts: for each pair, and for each particle.
+    pub fn bytes_to_make(&self, dim: usize) -> [f64; 2] {
+        match self.tensor {
+            Tensor::Projected => projected::bytes(dim),
+            _ => [0.0; 2],
+        }
     }
 
     /// Whether its stored weights are all of it.

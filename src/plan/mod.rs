@@ -83,6 +83,11 @@ impl Plan {
             pairs,
             format!("{} w_ab, {evaluations} per pair", facts.operator),
         );
+        let [pair, particle] = choices.operator.bytes_to_make(facts.dim);
+        if pair > 0.0 {
+            let about = "moments of a Laplacian for all particles at once; memory for as long as it takes";
+            add("project", setup, pairs * pair + n * particle, 30.0 * pairs, about.into());
+        }
         if choices.normalise {
             add("normalise", setup, 8.0 * n, pairs, "pairs scaled by the mean of 1/K_a and 1/K_b".into());
         }

@@ -280,7 +280,8 @@ impl State {
 
     fn refuse_what_does_not_fit(&self) -> Result<()> {
         let neighbours = self.geometry.as_ref().map_or(0.0, |g| g.neighbours);
-        let bytes = (neighbours * self.len() as f64 * 12.0) as u64;
+        let [pair, particle] = self.choices.operator.bytes_to_make(self.choices.kernel.dim());
+        let bytes = ((neighbours * (12.0 + pair) + particle) * self.len() as f64) as u64;
         let available = self.choices.memory.unwrap_or_else(memory::available);
         if bytes <= available {
             return Ok(());

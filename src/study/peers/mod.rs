@@ -52,8 +52,13 @@ static PEERS: &[Peer] = &[
 ];
 
 /// What is set against them: each operator with a kernel and an h_fac that suit it.
-const OURS: [(&str, &str, f64); 4] =
-    [("brookshaw", "M4", 1.3), ("brookshaw", "M6", 1.0), ("consistent", "C2", 1.3), ("consistent", "M4", 1.2)];
+const OURS: [(&str, &str, f64); 5] = [
+    ("brookshaw", "M4", 1.3),
+    ("brookshaw", "M6", 1.0),
+    ("projected", "M4", 1.3),
+    ("consistent", "C2", 1.3),
+    ("consistent", "M4", 1.2),
+];
 
 /// What one of them gave.
 struct Found {
