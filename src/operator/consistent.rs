@@ -199,3 +199,48 @@ impl Basis {
         self.rank.len()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::table;
+    use super::*;
+    use crate::array::Strided;
+    use crate::kernel::Kernel;
+    use crate::space::{Cloud, Domain, Scratch, rows::Rows};
+
+    #[test]
+    fn the_bits_are_the_same_with_and_without_avx2() {
+        let pool = Pool::new(1).unwrap();
+        let mut state = 5u64;
+        let mut uniform = || {
+            state = state.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            (state >> 11) as f64 / (1u64 << 53) as f64
+        };
+        let mut met = [0; 7];
+        for (dim, h) in [(1, 0.03), (2, 0.09), (3, 0.2)] {
+            let n = 300;
+            let x: Vec<f64> = (0..n * dim).map(|_| uniform()).collect();
+            let kernel = Kernel::new("M4", dim).unwrap();
+            let (h, volume) = (vec![h; n], vec![1.0 / n as f64; n]);
+            let cloud =
+                Cloud::sort(&Domain::open(dim), Strided::new("x", &x, n, dim, dim).unwrap(), 0.4, &pool).unwrap();
+            let rows = Rows::new(&cloud, &h, kernel.radius(), &pool).unwrap();
+            let operator = table::find("consistent").unwrap();
+            let (same_h, order, any_row, shape) = (true, 6, false, None);
+            let assembly =
+                Assembly { operator, kernel: &kernel, rows: &rows, volume: &volume, same_h, order, any_row, shape };
+            let (mut space, mut plain) = (Space::default(), Space::default());
+            rows.visit(0..n, &mut Scratch::default(), |row| {
+                let mut w = vec![0.0; row.len()];
+                kernel.w(&row.r.iter().map(|r| r / h[0]).collect::<Vec<_>>(), &mut w);
+                let mut other = w.clone();
+                let reached = fit(&assembly, &row, &mut w, &mut space).unwrap();
+                assert_eq!(fit_anywhere(&assembly, &row, &mut other, &mut plain).unwrap(), reached);
+                assert!(w.iter().zip(&other).all(|(a, b)| a.to_bits() == b.to_bits()), "{dim}-D order {reached}");
+                met[reached as usize] += 1;
+            })
+            .unwrap();
+        }
+        assert!([0, 2, 4, 6].iter().all(|&order| met[order] > 10), "{met:?}");
+    }
+}
