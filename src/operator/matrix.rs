@@ -232,14 +232,18 @@ impl Matrix {
 
     /// The stored neighbours of a particle.
     pub fn columns(&self, i: usize) -> &[u32] {
+        &self.blocks[i / BLOCK].col[self.places(i)]
+    }
+
+    /// The places of its pairs in its block.
+    pub fn places(&self, i: usize) -> Range<usize> {
         let block = &self.blocks[i / BLOCK];
-        &block.col[block.row(i - block.first).1]
+        block.row(i - block.first).1
     }
 
     /// Their coefficients.
     pub fn coefficients(&self, i: usize) -> &[f64] {
-        let block = &self.blocks[i / BLOCK];
-        &block.coef[block.row(i - block.first).1]
+        &self.blocks[i / BLOCK].coef[self.places(i)]
     }
 
     /// Replaces each coefficient by the mean of itself and its mate's, g_ba. Rows must list each other.

@@ -166,18 +166,22 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
         self.pool.chunks(items, BLOCK, |start, part| part.iter_mut().enumerate().for_each(|(k, v)| f(start + k, v)));
     }
 
-    /// Adds up `f(sum, ψ, pair)` over the pairs of each particle.
+    /// The pairs of a particle.
     #[inline(always)]
-    fn over_pairs<T: Send>(&self, sums: &mut [T], f: impl Fn(&mut T, Psi<D, C>, Pair) + Sync + Send) {
-        self.pool.chunks(sums, BLOCK, |start, part| {
-            let (apart, mut at) = (&self.apart[start / BLOCK], 0);
-            for (k, sum) in part.iter_mut().enumerate() {
-                let a = start + k;
-                for (&b, &g) in self.prior.columns(a).iter().zip(self.prior.coefficients(a)) {
-                    f(sum, psi(&apart[at]), Pair { a, b: b as usize, at, g });
-                    at += 1;
-                }
-            }
+    fn pairs(&self, a: usize) -> impl Iterator<Item = (Psi<D, C>, Pair)> {
+        let places = self.prior.places(a);
+        let apart = &self.apart[a / BLOCK][places.clone()];
+        let others = self.prior.columns(a).iter().zip(self.prior.coefficients(a));
+        apart.iter().zip(others).zip(places).map(move |((d, (&b, &g)), at)| (psi(d), Pair { a, b: b as usize, at, g }))
+    }
+
+    /// Adds up `f(sum, ψ, pair)` over the pairs of each particle.
+    fn over_pairs<T: Copy + Send>(&self, sums: &mut [T], f: impl Fn(&mut T, Psi<D, C>, Pair) + Sync + Send) {
+        self.each(sums, |a, sum| {
+            // A copy, which can stay in registers.
+            let mut own = *sum;
+            self.pairs(a).for_each(|(psi, pair)| f(&mut own, psi, pair));
+            *sum = own;
         });
     }
 
@@ -219,11 +223,9 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
             used.push(memory::filled("pairs in use", apart.len(), false)?);
         }
         self.pool.chunks(&mut used, 1, |block, used| {
-            let (apart, used, mut at) = (&self.apart[block], &mut used[0], 0);
             for a in block * BLOCK..((block + 1) * BLOCK).min(self.prior.len()) {
-                for &b in self.prior.columns(a) {
-                    used[at] = factor(&psi(&apart[at]), &lambda[a], &lambda[b as usize]) > 0.0;
-                    at += 1;
+                for (psi, Pair { b, at, .. }) in self.pairs(a) {
+                    used[0][at] = factor(&psi, &lambda[a], &lambda[b]) > 0.0;
                 }
             }
         });
