@@ -11,6 +11,10 @@ use std::thread::JoinHandle;
 /// Particles per block of parallel work. Fixed: results must not depend on the number of threads.
 pub const BLOCK: usize = 1024;
 
+/// Particles below which the caller's thread does alone what takes a few nanoseconds for each: to wake workers takes some
+/// 20 µs. On two cores a compensated sum repays that from 20 blocks on, y += a x from 60.
+pub const FEW: usize = 24 * BLOCK;
+
 pub struct Pool {
     threads: usize,
     workers: Option<rayon::ThreadPool>,
@@ -65,6 +69,15 @@ impl Pool {
                 data.par_chunks_mut(chunk).enumerate().for_each(|(i, part)| f(i * chunk, part));
             }),
             _ => data.chunks_mut(chunk).enumerate().for_each(|(i, part)| f(i * chunk, part)),
+        }
+    }
+
+    /// As [`Pool::chunks`] with blocks, where each item takes a few nanoseconds: [`FEW`] are not shared out.
+    pub fn update<T: Send>(&self, data: &mut [T], f: impl Fn(usize, &mut [T]) + Sync + Send) {
+        if data.len() < FEW {
+            data.chunks_mut(BLOCK).enumerate().for_each(|(b, part)| f(b * BLOCK, part));
+        } else {
+            self.chunks(data, BLOCK, f);
         }
     }
 

@@ -1,7 +1,7 @@
 //! Sums, norms and extrema over particles that are the same to the bit for any number of threads: fixed blocks, each
 //! added up in order, block sums combined in block order with compensation (Neumaier 1974).
 
-use crate::pool::{BLOCK, Pool};
+use crate::pool::{BLOCK, FEW, Pool};
 
 /// The compensated sum of a few numbers, in order.
 pub fn compensated(values: impl IntoIterator<Item = f64>) -> f64 {
@@ -77,7 +77,8 @@ pub fn first(pool: &Pool, n: usize, test: impl Fn(usize) -> bool + Sync + Send) 
 }
 
 fn blocks<T: Send>(pool: &Pool, n: usize, f: impl Fn(std::ops::Range<usize>) -> T + Sync + Send) -> Vec<T> {
-    pool.map(n.div_ceil(BLOCK), |b| f(b * BLOCK..((b + 1) * BLOCK).min(n)))
+    let (count, of_block) = (n.div_ceil(BLOCK), |b: usize| f(b * BLOCK..((b + 1) * BLOCK).min(n)));
+    if n < FEW { (0..count).map(of_block).collect() } else { pool.map(count, of_block) }
 }
 
 #[cfg(test)]

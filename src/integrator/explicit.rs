@@ -2,7 +2,7 @@
 
 use super::{System, Work};
 use crate::error::Result;
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 
 /// Stage i is y + dt Σ_j a[i][j] k_j at t + c[i] dt, where k_j is the rate at stage j; the step is y + dt Σ_j b[j] k_j.
 #[derive(Debug)]
@@ -54,13 +54,13 @@ impl Tableau {
                 system.rate(t, y, rate)?;
                 continue;
             }
-            pool.chunks(stage, BLOCK, |start, part| {
+            pool.update(stage, |start, part| {
                 part.copy_from_slice(&y[start..start + part.len()]);
                 add(part, start, dt, a, known);
             });
             system.rate(t + c * dt, stage, rate)?;
         }
-        pool.chunks(y, BLOCK, |start, part| add(part, start, dt, self.b, rates));
+        pool.update(y, |start, part| add(part, start, dt, self.b, rates));
         Ok(())
     }
 }

@@ -9,7 +9,7 @@
 use super::krylov::{Equations, Limits, add, unsolved};
 use super::{Linear, Schedule, Shifted, System, Work};
 use crate::error::{Error, Result};
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 use crate::sum;
 
 /// Stage i is Y_i = y + dt Σ_j a[i][j] k_j, j ≤ i, at t + c[i] dt; the last one is the step (stiffly accurate). A zero on
@@ -89,7 +89,7 @@ impl Tableau {
                 slack += conserve(pool, g, supplied, y, stage, space);
             }
             // Not rate(Y): that would carry the residual, and be multiplied by dt once more.
-            pool.chunks(rates[i], BLOCK, |start, part| {
+            pool.update(rates[i], |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, rate)| *rate = (stage[start + k] - base[start + k]) / g);
             });
         }
@@ -121,7 +121,7 @@ fn solve(
             Err(Error::BadElement { .. } | Error::NotFinite { .. }) if taken.halve(pool, y, correction) => continue,
             done => done?,
         }
-        pool.chunks(residual, BLOCK, |start, part| {
+        pool.update(residual, |start, part| {
             part.iter_mut().enumerate().for_each(|(k, f)| *f = base[start + k] + g * *f - y[start + k]);
         });
         let linear = system.linearise(t, y, diagonal, weight)?;
@@ -196,7 +196,7 @@ fn conserve(pool: &Pool, g: f64, supplied: f64, y: &[f64], stage: &mut [f64], sp
     if !each.is_finite() || excess == 0.0 {
         return 0.0;
     }
-    pool.chunks(stage, BLOCK, |start, part| {
+    pool.update(stage, |start, part| {
         part.iter_mut().enumerate().for_each(|(k, stage)| *stage -= each * share(start + k));
     });
     each.abs()

@@ -3,7 +3,7 @@
 
 use super::{Shifted, System};
 use crate::error::{Error, Result};
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 use crate::sum;
 
 /// How far a system of equations is solved.
@@ -49,11 +49,11 @@ impl Equations<'_> {
             self.precondition(r, q)?;
             length = sum::sum(pool, n, |i| weight[i] * r[i] * q[i]);
             let again = length / before;
-            pool.chunks(p, BLOCK, |start, part| {
+            pool.update(p, |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, p)| *p = q[start + k] + again * *p);
             });
             self.system.apply(p, q)?;
-            pool.chunks(q, BLOCK, |start, part| {
+            pool.update(q, |start, part| {
                 part.iter_mut().zip(&p[start..]).for_each(|(q, p)| *q = p - g * *q);
             });
             let curvature = sum::sum(pool, n, |i| weight[i] * p[i] * q[i]);
@@ -75,7 +75,7 @@ impl Equations<'_> {
         let size = sum::max(pool, n, |i| r[i].abs());
         if self.system.flatten(self.shifted, y, x)? && size > sum::max(pool, n, |i| x[i].abs()) {
             self.system.apply(x, q)?;
-            pool.chunks(q, BLOCK, |start, part| {
+            pool.update(q, |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, q)| *q = r[start + k] - (x[start + k] - g * *q));
             });
             if sum::max(pool, n, |i| q[i].abs()) < size {
@@ -90,7 +90,7 @@ impl Equations<'_> {
     fn precondition(&mut self, r: &[f64], z: &mut [f64]) -> Result<()> {
         let Shifted { g, diagonal, .. } = self.shifted;
         if !self.system.precondition(self.shifted, r, z)? {
-            self.pool.chunks(z, BLOCK, |start, part| {
+            self.pool.update(z, |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, z)| *z = r[start + k] / (1.0 + g * diagonal[start + k]));
             });
         }
@@ -100,7 +100,7 @@ impl Equations<'_> {
 
 /// `to += factor * what`.
 pub fn add(pool: &Pool, to: &mut [f64], factor: f64, what: &[f64]) {
-    pool.chunks(to, BLOCK, |start, part| {
+    pool.update(to, |start, part| {
         part.iter_mut().zip(&what[start..]).for_each(|(to, what)| *to += factor * what);
     });
 }

@@ -4,7 +4,7 @@
 
 use super::{Schedule, System, Work};
 use crate::error::Result;
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 
 /// The fewest stages a schedule takes. It takes odd numbers: with an even one the stability polynomial is 1 at the end
 /// of its interval, and the shortest wave stays.
@@ -90,7 +90,7 @@ impl Recursion {
         system.rate(t, y, first_rate)?;
         let first = (self.stage)(s, 1.0).mu_rate;
         before.copy_from_slice(y);
-        pool.chunks(last, BLOCK, |start, part| {
+        pool.update(last, |start, part| {
             for (new, (y, rate)) in part.iter_mut().zip(y[start..].iter().zip(&first_rate[start..])) {
                 *new = y + dt * first * rate;
             }
@@ -100,14 +100,14 @@ impl Recursion {
         for j in 2..=schedule.stages {
             let k = (self.stage)(s, f64::from(j));
             system.rate(t + time_last * dt, last, rate)?;
-            pool.chunks(before, BLOCK, |start, part| {
+            pool.update(before, |start, part| {
                 k.update(dt, part, [&y[start..], &last[start..], &rate[start..], &first_rate[start..]]);
             });
             let time = k.mu * time_last + k.nu * time_before + k.mu_rate + k.gamma_rate;
             (time_before, time_last) = (time_last, time);
             std::mem::swap(before, last);
         }
-        pool.chunks(y, BLOCK, |start, part| part.copy_from_slice(&last[start..start + part.len()]));
+        pool.update(y, |start, part| part.copy_from_slice(&last[start..start + part.len()]));
         Ok(())
     }
 }

@@ -7,7 +7,7 @@ use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::operator::{Mean, Multigrid, Pairs};
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 use crate::sum;
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -105,7 +105,7 @@ impl Heat<'_> {
         self.applications += 1;
         self.diffuse(x, out)?;
         let slopes = &self.slopes;
-        self.pool.chunks(&mut out[..slopes.len()], BLOCK, |start, part| {
+        self.pool.update(&mut out[..slopes.len()], |start, part| {
             part.iter_mut().enumerate().for_each(|(k, y)| *y -= slopes[start + k] * x[start + k]);
         });
         Ok(())
@@ -223,7 +223,7 @@ impl Heat<'_> {
             }
         };
         let (volume, inverse) = (self.volume, self.inverse_capacity);
-        self.pool.chunks(rate, BLOCK, |start, part| {
+        self.pool.update(rate, |start, part| {
             for (k, rate) in part.iter_mut().enumerate() {
                 let i = start + k;
                 *rate += source[i] * volume[i] * inverse[i];

@@ -27,11 +27,11 @@ pub fn rightmost(
     mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
 ) -> Result<(f64, f64)> {
     let n = weight.len();
-    let dot = |a: &[f64], b: &[f64]| sum::sum(pool, n, |i| weight[i] * a[i] * b[i]);
+    let norm = |v: &[f64]| sum::sum(pool, n, |i| weight[i] * v[i] * v[i]).sqrt();
     let mut next = memory::collected("Krylov space", (0..n).map(|i| if weight[i] > 0.0 { start(i) } else { 0.0 }))?;
     let mut basis: Vec<Vec<f64>> = Vec::new();
     let mut hessenberg = DMatrix::<f64>::zeros(APPLICATIONS + 1, APPLICATIONS);
-    let mut length = dot(&next, &next).sqrt();
+    let mut length = norm(&next);
     for k in 0..APPLICATIONS {
         if !length.is_finite() {
             return Err(Error::NotFinite { what: "the spectrum of the operator".into(), index: 0, value: length });
@@ -43,24 +43,53 @@ pub fn rightmost(
         if k > 0 {
             hessenberg[(k, k - 1)] = length;
         }
-        pool.chunks(&mut next, BLOCK, |_, part| part.iter_mut().for_each(|v| *v /= length));
+        pool.update(&mut next, |_, part| part.iter_mut().for_each(|v| *v /= length));
         basis.push(memory::copied("Krylov space", &next)?);
         apply(&basis[k], &mut next)?;
-        let whole = dot(&next, &next).sqrt();
-        for (j, vector) in basis.iter().enumerate() {
-            let share = dot(vector, &next);
-            hessenberg[(j, k)] = share;
-            pool.chunks(&mut next, BLOCK, |at, part| {
-                part.iter_mut().zip(&vector[at..]).for_each(|(v, b)| *v -= share * b);
-            });
+        // Twice, because rounding of the first time leaves something.
+        for _ in 0..2 {
+            let shares = take_out(pool, weight, &basis, &mut next);
+            shares.iter().enumerate().for_each(|(j, share)| hessenberg[(j, k)] += share);
         }
-        length = dot(&next, &next).sqrt();
+        length = norm(&next);
         // The vectors so far span all that the operator can reach.
-        if length <= SPANNED * whole {
+        if length <= SPANNED * hessenberg.column(k).norm() {
             break;
         }
     }
     extremes(hessenberg.view((0, 0), (basis.len(), basis.len())).into_owned())
+}
+
+/// Takes out of a vector what it has of an orthonormal basis, and answers how much of each: classical Gram and Schmidt, all
+/// vectors in one sweep.
+fn take_out(pool: &Pool, weight: &[f64], basis: &[Vec<f64>], vector: &mut [f64]) -> Vec<f64> {
+    let from = &*vector;
+    let of_block = |block: usize| {
+        let part = block * BLOCK..((block + 1) * BLOCK).min(from.len());
+        let share = |b: &Vec<f64>| dot(&weight[part.clone()], &b[part.clone()], &from[part.clone()]);
+        basis.iter().map(share).collect::<Vec<_>>()
+    };
+    let parts = pool.map(vector.len().div_ceil(BLOCK), of_block);
+    let shares: Vec<f64> = (0..basis.len()).map(|j| parts.iter().map(|part| part[j]).sum()).collect();
+    pool.chunks(vector, BLOCK, |at, part| {
+        for (share, b) in shares.iter().zip(basis) {
+            part.iter_mut().zip(&b[at..]).for_each(|(v, b)| *v -= share * b);
+        }
+    });
+    shares
+}
+
+/// Σ weight a b: four running sums and no compensation, for what is taken out twice.
+fn dot(weight: &[f64], a: &[f64], b: &[f64]) -> f64 {
+    let ((ws, w), (xs, x), (ys, y)) = (weight.as_chunks::<4>(), a.as_chunks::<4>(), b.as_chunks::<4>());
+    let mut sums = [0.0; 4];
+    for ((w, x), y) in ws.iter().zip(xs).zip(ys) {
+        for k in 0..4 {
+            sums[k] += w[k] * x[k] * y[k];
+        }
+    }
+    let rest: f64 = w.iter().zip(x).zip(y).map(|((w, x), y)| w * x * y).sum();
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// The largest real part and the largest modulus among the eigenvalues of a matrix.

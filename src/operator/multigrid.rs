@@ -9,7 +9,7 @@ use super::sparse::Sparse;
 use super::spectrum;
 use crate::error::Result;
 use crate::memory;
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 use nalgebra::{Cholesky, DMatrix, DVectorViewMut, Dyn};
 
 /// A level of so many unknowns or fewer is solved directly.
@@ -324,7 +324,7 @@ fn interpolate(graph: &impl Graph, of: &[u32], step: f64, i: usize, gather: &mut
 
 /// Sets each value to what `f` makes of its place and of what it was.
 fn set_each(pool: &Pool, values: &mut [f64], f: impl Fn(usize, f64) -> f64 + Sync + Send) {
-    pool.chunks(values, BLOCK, |start, part| {
+    pool.update(values, |start, part| {
         part.iter_mut().enumerate().for_each(|(k, value)| *value = f(start + k, *value));
     });
 }

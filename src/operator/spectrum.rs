@@ -48,7 +48,7 @@ pub fn estimate(
         let (Some(size_x), Some(size_y)) = (norm(&x), norm(&y)) else { break };
         // Scaled by the largest element, so that no unit system over- or underflows.
         let next = (length2(&y, size_y) / length2(&x, size_x)).sqrt() * (size_y / size_x);
-        pool.chunks(&mut y, crate::pool::BLOCK, |_, part| part.iter_mut().for_each(|v| *v /= size_y));
+        pool.update(&mut y, |_, part| part.iter_mut().for_each(|v| *v /= size_y));
         std::mem::swap(&mut x, &mut y);
         let settled = (next - estimate).abs() <= SETTLED * next;
         estimate = next;
