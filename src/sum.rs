@@ -19,6 +19,19 @@ pub fn sum(pool: &Pool, n: usize, term: impl Fn(usize) -> f64 + Sync + Send) -> 
     compensated(blocks(pool, n, |range| compensated(range.map(&term))))
 }
 
+/// Σ w x y of a few numbers: four running sums and no compensation.
+pub fn product(w: &[f64], x: &[f64], y: &[f64]) -> f64 {
+    let ((ws, w), (xs, x), (ys, y)) = (w.as_chunks::<4>(), x.as_chunks::<4>(), y.as_chunks::<4>());
+    let rest: f64 = w.iter().zip(x).zip(y).map(|((w, x), y)| w * (x * y)).sum();
+    let mut sums = [0.0; 4];
+    for ((w, x), y) in ws.iter().zip(xs).zip(ys) {
+        for k in 0..4 {
+            sums[k] += w[k] * (x[k] * y[k]);
+        }
+    }
+    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+}
+
 /// The largest `term(i)`; negative infinity where n is 0. A NaN is passed on.
 pub fn max(pool: &Pool, n: usize, term: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
     let larger = |a: f64, b: f64| if a.is_nan() || a > b { a } else { b };

@@ -38,9 +38,7 @@ pub fn run(args: &StudyArgs) -> Result<ExitCode> {
     interrupt::listen();
     if let Some(folder) = &args.out {
         // Before the work, which may take minutes.
-        let failed =
-            |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
-        std::fs::create_dir_all(folder).map_err(failed)?;
+        atomic::make_folder(folder)?;
     }
     let answer =
         (study.run)(Request { full: args.full, tiny: args.tiny, scene: args.scene.clone(), watch: progress::watch() })?;

@@ -15,6 +15,12 @@ pub fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Resul
     })
 }
 
+/// Makes a folder and those above it where they are not there yet.
+pub fn make_folder(folder: &Path) -> Result<()> {
+    let failed = |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
+    std::fs::create_dir_all(folder).map_err(failed)
+}
+
 fn replace_or_fail(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
     // A device or a pipe would be swapped for a plain file by the rename.
     if path.metadata().is_ok_and(|m| !m.is_file()) {

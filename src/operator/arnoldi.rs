@@ -66,7 +66,7 @@ fn take_out(pool: &Pool, weight: &[f64], basis: &[Vec<f64>], vector: &mut [f64])
     let from = &*vector;
     let of_block = |block: usize| {
         let part = block * BLOCK..((block + 1) * BLOCK).min(from.len());
-        let share = |b: &Vec<f64>| dot(&weight[part.clone()], &b[part.clone()], &from[part.clone()]);
+        let share = |b: &Vec<f64>| sum::product(&weight[part.clone()], &b[part.clone()], &from[part.clone()]);
         basis.iter().map(share).collect::<Vec<_>>()
     };
     let parts = pool.map(vector.len().div_ceil(BLOCK), of_block);
@@ -77,19 +77,6 @@ fn take_out(pool: &Pool, weight: &[f64], basis: &[Vec<f64>], vector: &mut [f64])
         }
     });
     shares
-}
-
-/// Σ weight a b: four running sums and no compensation, for what is taken out twice.
-fn dot(weight: &[f64], a: &[f64], b: &[f64]) -> f64 {
-    let ((ws, w), (xs, x), (ys, y)) = (weight.as_chunks::<4>(), a.as_chunks::<4>(), b.as_chunks::<4>());
-    let mut sums = [0.0; 4];
-    for ((w, x), y) in ws.iter().zip(xs).zip(ys) {
-        for k in 0..4 {
-            sums[k] += w[k] * x[k] * y[k];
-        }
-    }
-    let rest: f64 = w.iter().zip(x).zip(y).map(|((w, x), y)| w * x * y).sum();
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
 }
 
 /// The largest real part and the largest modulus among the eigenvalues of a matrix.

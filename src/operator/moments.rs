@@ -8,6 +8,7 @@ use crate::error::Result;
 use crate::memory;
 use crate::pool::Pool;
 use crate::space::{Axes, Row};
+use crate::sum;
 
 /// h_a Σ_b V_b w_ab (r_b − r_a) for each particle: dimensionless, one component per axis. `stored`: where coefficients are
 /// not those that the assembly makes of a row.
@@ -39,15 +40,7 @@ pub fn second(assembly: &Assembly, matrix: &Matrix, pool: &Pool) -> Result<Vec<f
     Ok(out)
 }
 
-/// Σ_b g_ab r². Four running sums, as in [`super::matrix`].
+/// Σ_b g_ab r².
 pub fn of_row(g: &[f64], r: &[f64]) -> f64 {
-    let mut sums = [0.0; 4];
-    let (fours, rs) = (g.chunks_exact(4), r.chunks_exact(4));
-    let rest: f64 = fours.remainder().iter().zip(rs.remainder()).map(|(g, r)| g * (r * r)).sum();
-    for (g, r) in fours.zip(rs) {
-        for k in 0..4 {
-            sums[k] += g[k] * (r[k] * r[k]);
-        }
-    }
-    (sums[0] + sums[1]) + (sums[2] + sums[3]) + rest
+    sum::product(g, r, r)
 }

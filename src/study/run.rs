@@ -5,8 +5,8 @@ use super::report::{Accuracy, Energy, LeftOut, Report, Seconds, Temperature, Wor
 pub use super::samples::Field;
 use super::scene::{Output, Scene};
 use super::setup::{at_all, setup};
-use crate::error::{Error, Result};
-use crate::io::Series;
+use crate::error::Result;
+use crate::io::{Series, atomic};
 use crate::model::fields;
 use crate::plan::Plan;
 use crate::solver::Solver;
@@ -203,9 +203,7 @@ impl Writer {
         output.fields.iter().try_for_each(|name| fields::field(name).map(drop))?;
         let pvd = out.join(&output.pvd);
         let folder = pvd.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-        let failed =
-            |e| Error::Io { path: folder.display().to_string(), reason: format!("cannot make this folder: {e}") };
-        std::fs::create_dir_all(folder).map_err(failed)?;
+        atomic::make_folder(folder)?;
         let series = Series::open_or_create(&pvd)?;
         Ok(Writer { output: output.clone(), pvd, series, count: 0, seconds: 0.0 })
     }
