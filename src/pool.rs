@@ -5,7 +5,7 @@
 
 use crate::error::{Error, Result};
 use rayon::prelude::*;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 
 /// Particles per block of parallel work. Fixed: results must not depend on the number of threads.
@@ -14,6 +14,12 @@ pub const BLOCK: usize = 1024;
 /// Particles below which the caller's thread does alone what takes a few nanoseconds for each: to wake workers takes some
 /// 20 µs. On two cores a compensated sum repays that from 20 blocks on, y += a x from 60.
 pub const FEW: usize = 24 * BLOCK;
+
+/// A result on its way from a worker: it is written by one thread and read by another, never shared.
+struct Guarded<T>(T);
+
+// SAFETY: nobody has a reference to a result before all workers are done.
+unsafe impl<T: Send> Sync for Guarded<T> {}
 
 pub struct Pool {
     threads: usize,
@@ -40,35 +46,51 @@ impl Pool {
 
     /// `f(0), f(1), … f(n - 1)` in any order of execution, results in order.
     pub fn map<T: Send>(&self, n: usize, f: impl Fn(usize) -> T + Sync + Send) -> Vec<T> {
-        match &self.workers {
-            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().map(&f).collect()),
-            _ => (0..n).map(f).collect(),
-        }
+        self.map_init(n, || (), |(), i| f(i))
     }
 
     /// As [`Pool::map`], with scratch space that a worker makes once and reuses.
-    pub fn map_init<S, T: Send>(
+    pub fn map_init<S: Send, T: Send>(
         &self,
         n: usize,
         init: impl Fn() -> S + Sync + Send,
         f: impl Fn(&mut S, usize) -> T + Sync + Send,
     ) -> Vec<T> {
-        match &self.workers {
-            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().map_init(&init, &f).collect()),
-            _ => {
-                let mut scratch = init();
-                (0..n).map(|i| f(&mut scratch, i)).collect()
-            }
+        if self.workers.is_none() || n <= 1 {
+            let mut scratch = init();
+            return (0..n).map(|i| f(&mut scratch, i)).collect();
         }
+        let results: Vec<OnceLock<Guarded<T>>> = (0..n).map(|_| OnceLock::new()).collect();
+        let spare = Mutex::new(Vec::new());
+        self.each(n, &|i| {
+            let kept = spare.lock().ok().and_then(|mut list| list.pop());
+            let mut scratch = kept.unwrap_or_else(&init);
+            let _ = results[i].set(Guarded(f(&mut scratch, i)));
+            if let Ok(mut list) = spare.lock() {
+                list.push(scratch);
+            }
+        });
+        results.into_iter().filter_map(OnceLock::into_inner).map(|r| r.0).collect()
     }
 
     /// Calls `f(start, chunk)` for consecutive chunks of `data`, `chunk` items long (the last may be shorter).
     pub fn chunks<T: Send>(&self, data: &mut [T], chunk: usize, f: impl Fn(usize, &mut [T]) + Sync + Send) {
+        if self.workers.is_none() || data.len() <= chunk {
+            return data.chunks_mut(chunk).enumerate().for_each(|(i, part)| f(i * chunk, part));
+        }
+        let parts: Vec<Mutex<&mut [T]>> = data.chunks_mut(chunk).map(Mutex::new).collect();
+        self.each(parts.len(), &|i| {
+            if let Ok(mut part) = parts[i].lock() {
+                f(i * chunk, &mut part);
+            }
+        });
+    }
+
+    /// The one door to the workers: whatever is done for blocks, the code that shares them out is compiled once.
+    fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync)) {
         match &self.workers {
-            Some(pool) if data.len() > chunk => pool.install(|| {
-                data.par_chunks_mut(chunk).enumerate().for_each(|(i, part)| f(i * chunk, part));
-            }),
-            _ => data.chunks_mut(chunk).enumerate().for_each(|(i, part)| f(i * chunk, part)),
+            Some(pool) => pool.install(|| (0..n).into_par_iter().for_each(work)),
+            None => (0..n).for_each(work),
         }
     }
 
