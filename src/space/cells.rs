@@ -19,6 +19,8 @@ pub struct Cells {
     pub h_max: f64,
     /// All smoothing lengths are the same.
     pub same_h: bool,
+    /// Which of `levels` each number of a level is; those without particles are not kept.
+    kept: Vec<usize>,
 }
 
 /// One level: its particles in internal order, cut into cells.
@@ -42,17 +44,20 @@ impl Cells {
             true => vec![memory::collected("cell lists", 0..h.len() as u32)?],
             false => by_level(h, h_max)?,
         };
+        let (mut kept, mut filled) = (Vec::new(), 0);
+        for list in &members {
+            kept.push(filled);
+            filled += usize::from(!list.is_empty());
+        }
         let filled = members.into_iter().filter(|m| !m.is_empty());
         let levels: Result<Vec<Level>> = filled.map(|m| Level::new(cloud, h, radius, m)).collect();
-        Ok(Cells { levels: levels?, h_max, same_h: h_max == h_min })
+        Ok(Cells { levels: levels?, h_max, same_h: h_max == h_min, kept })
     }
 
     /// The key of particle i's cell on its own level: neighbours in internal order that share it are searched together.
     pub fn group_key(&self, cloud: &Cloud, i: usize, h: f64) -> (usize, u64) {
-        let level = level_of(h, self.h_max);
-        let edge_shift = self.levels.first().map_or(0, |l| l.shift) as usize;
-        let shift = edge_shift.saturating_sub(level) * cloud.dim();
-        (level, cloud.keys[i] >> shift)
+        let level = self.kept[level_of(h, self.h_max)];
+        (level, self.levels[level].key(cloud, i))
     }
 }
 
@@ -79,6 +84,11 @@ fn level_of(h: f64, h_max: f64) -> usize {
     if h == h_max { 0 } else { ((h_max / h).log2() as usize).min(MAX_LEVEL) }
 }
 
+/// A particle's key where cells are 2^shift fine ones long.
+fn cell_key(cloud: &Cloud, i: usize, shift: u32) -> u64 {
+    cloud.keys[i] >> (shift as usize * cloud.dim()).min(63)
+}
+
 impl Level {
     fn new(cloud: &Cloud, h: &[f64], radius: f64, members: Vec<u32>) -> Result<Level> {
         let dim = cloud.dim();
@@ -88,7 +98,7 @@ impl Level {
         let shift = (doublings.ceil().max(0.0) as u32).min(morton::bits(dim));
         let (mut keys, mut starts) = (Vec::new(), Vec::new());
         for (at, &i) in members.iter().enumerate() {
-            let key = cloud.keys[i as usize] >> (shift as usize * dim).min(63);
+            let key = cell_key(cloud, i as usize, shift);
             if keys.last() != Some(&key) {
                 if keys.len() == keys.capacity() {
                     let more = keys.len().max(64);
@@ -104,6 +114,11 @@ impl Level {
         index.try_reserve(keys.len()).map_err(|_| memory::no_memory::<(u64, u32)>("cell table", keys.len()))?;
         index.extend(keys.iter().enumerate().map(|(at, &key)| (key, at as u32)));
         Ok(Level { h_max, members, shift, keys, starts, index })
+    }
+
+    /// The key of the cell in which a particle is on this level.
+    fn key(&self, cloud: &Cloud, i: usize) -> u64 {
+        cell_key(cloud, i, self.shift)
     }
 
     /// Calls `found` with the particles of every occupied cell that overlaps a box of positions inside the domain.

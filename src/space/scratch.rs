@@ -1,7 +1,7 @@
 //! Who is near enough: candidates collected from cells, and those within reach picked out, for one particle at a time.
 
 use super::{Axes, Cloud, Domain};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::memory;
 
 /// The neighbours of particle `i`, itself excluded (its periodic images included), in a fixed order.
@@ -130,7 +130,6 @@ impl Scratch {
         reach: f64,
         shifted: bool,
     ) -> Result<Row<'_>> {
-        debug_assert!(self.j[itself] as usize == i);
         self.reserve_row(self.j.len(), D)?;
         let n = match shifted {
             true => self.pick::<D, true>(itself, centre, reach),
@@ -140,11 +139,17 @@ impl Scratch {
         Ok(Row { i, j: &self.row_j[..n], r: &self.row_r[..n], d })
     }
 
-    /// Which candidate is a particle that is no image.
-    pub fn place(&self, i: usize) -> Option<usize> {
+    /// The first of the candidates, one after the other, that are the particles from i on, and no images.
+    ///
+    /// # Errors
+    /// `Panic` where they are not there: a search among the wrong cells must not pass for one without neighbours.
+    pub fn place(&self, i: usize, count: usize) -> Result<usize> {
         let here = |c: &usize| self.shift.iter().all(|shift| shift.get(*c).is_none_or(|s| *s == 0.0));
         let candidates = self.j.iter().enumerate().filter(|(_, j)| **j as usize == i);
-        candidates.map(|(c, _)| c).find(here)
+        let found = candidates.map(|(c, _)| c).find(here);
+        let all = |first: &usize| self.j[*first..].iter().zip(i..).take_while(|(j, i)| **j as usize == *i).count() >= count;
+        let lost = || Error::Panic { reason: format!("particle {i} is not in the cell that was searched for it") };
+        found.filter(all).ok_or_else(lost)
     }
 
     fn pick<const D: usize, const SHIFTED: bool>(&mut self, itself: usize, centre: [f64; D], reach: f64) -> usize {
