@@ -1,5 +1,6 @@
 //! The words that a solver is created with, read once.
 
+use super::applies;
 use super::auto::{self, Auto};
 use super::preconditioner::{self, Preconditioner};
 use super::rules::RULES;
@@ -28,7 +29,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "allow",
-        "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent without a check of its spectrum",
+        "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent without a check of its spectrum; flat: particles that fill fewer dimensions than dim, like a sheet of one layer in 3-D; both: unstable,flat",
     ),
     (
         "normalise",
@@ -94,6 +95,8 @@ pub struct Choices {
     pub corrected: bool,
     /// Weights may be negative where the host insists.
     pub allow_unstable: bool,
+    /// Particles may leave an axis empty.
+    pub allow_flat: bool,
     pub mean: Mean,
     pub method: &'static Method,
     /// The method is chosen anew for each step.
@@ -113,8 +116,15 @@ impl Choices {
     /// Reads `heat dim=3 kernel=M6 …`.
     ///
     /// # Errors
-    /// `UnknownWord` or `BadValue` naming the word.
+    /// `UnknownWord` or `BadValue` naming the word; `BadValue` too for one that can have no effect beside the others.
     pub fn parse(line: &str) -> Result<Choices> {
+        let choices = Choices::parse_any(line)?;
+        applies::check(&choices)?;
+        Ok(choices)
+    }
+
+    /// The same, whether all words have an effect or not.
+    pub(super) fn parse_any(line: &str) -> Result<Choices> {
         let mut words = Words::parse("words", line)?;
         let models: Vec<(&str, ())> = MODELS.iter().map(|m| (m.name, ())).collect();
         choice("model", words.bare().unwrap_or("nothing"), &models)?;
@@ -147,10 +157,12 @@ impl Choices {
             None => true,
             Some(word) => choice("gradient", word, &[("corrected", true), ("plain", false)])?,
         };
-        let allow_unstable = match words.take("allow") {
-            None => false,
-            Some(word) => choice("allow", word, &[("unstable", true)])?,
-        };
+        let allowed: Vec<&str> = words.take("allow").into_iter().flat_map(|list| list.split(',')).collect();
+        for word in &allowed {
+            choice("allow", word, &[("unstable", ()), ("flat", ())])?;
+        }
+        let allows = |what: &str| allowed.iter().any(|word| word.eq_ignore_ascii_case(what));
+        let (allow_unstable, allow_flat) = (allows("unstable"), allows("flat"));
         let options = options(&mut words, operator)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
         let tolerance = tolerance(&mut words, auto.as_ref().map(|_| auto::TOLERANCE))?;
@@ -166,9 +178,8 @@ impl Choices {
         let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
         let without = without(words.take("without"))?;
         words.done()?;
-        let line = line.split_whitespace().collect::<Vec<_>>().join(" ");
         Ok(Choices {
-            line,
+            line: line.split_whitespace().collect::<Vec<_>>().join(" "),
             kernel,
             h_fac,
             operator,
@@ -177,6 +188,7 @@ impl Choices {
             theta: theta.unwrap_or(THETA),
             corrected,
             allow_unstable,
+            allow_flat,
             mean,
             method,
             auto,
@@ -281,33 +293,22 @@ mod tests {
 
     #[test]
     fn every_documented_word_is_read() {
-        let values = [
-            "dim=2",
-            "kernel=M4",
-            "h_fac=1.2",
-            "operator=kernel",
-            "order=6",
-            "theta=0.5",
-            "gradient=plain",
-            "allow=unstable",
-            "normalise=pair",
-            "mean=geometric",
-            "integrator=rkl1",
-            "stages=5",
-            "change=0.1",
-            "max_stages=9",
-            "bounds=free",
-            "max_applications=7",
-            "tolerance=1e-5",
-            "solver_tolerance=1e-6",
-            "max_iterations=500",
-            "preconditioner=jacobi",
-            "threads=1",
-            "memory=1e9",
-            "without=same_h",
+        // Words that do not go together stand on different lines.
+        let lines = [
+            "dim=2 kernel=M4 h_fac=1.2 operator=consistent order=6 allow=unstable,flat mean=geometric integrator=rkl1 \
+             stages=5 bounds=free max_applications=7 threads=1 memory=1e9 without=same_h",
+            "operator=two-first theta=0.5 gradient=plain normalise=pair integrator=sdirk2 solver_tolerance=1e-6 \
+             max_iterations=500 preconditioner=jacobi tolerance=1e-5",
+            "integrator=rkl2 tolerance=off change=0.1 max_stages=9",
         ];
-        assert_eq!(values.len(), WORDS.len());
-        assert!(values.iter().zip(WORDS).all(|(v, (w, _))| v.split('=').next() == Some(w)));
-        assert!(Choices::parse(&format!("heat {}", values.join(" "))).is_ok());
+        let key = |word: &'static str| word.split('=').next().unwrap_or_default();
+        let read: Vec<&str> = lines.iter().flat_map(|line| line.split_whitespace()).map(key).collect();
+        for (word, _) in WORDS {
+            assert!(read.contains(word), "{word}");
+        }
+        for line in lines {
+            let made = Choices::parse(&format!("heat {line}"));
+            assert!(made.is_ok(), "{line}: {}", made.err().unwrap());
+        }
     }
 }

@@ -30,11 +30,12 @@ pub struct Motion<'a> {
     pub known: &'a mut Option<Known>,
 }
 
-/// Bounds on an operator, and whether power iteration has lowered them.
+/// Bounds on an operator, and the same lowered by power iteration, once that was worth its work. Both are kept: what a
+/// step does must not depend on what was asked for before it.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
     pub bounds: Bounds,
-    refined: bool,
+    refined: Option<Bounds>,
 }
 
 impl System for Heat<'_> {
@@ -229,11 +230,11 @@ impl Motion<'_> {
     }
 
     fn refined(&mut self, known: Known, t: &[f64]) -> Result<Bounds> {
-        if known.refined {
-            return Ok(known.bounds);
+        if let Some(bounds) = known.refined {
+            return Ok(bounds);
         }
         let bounds = self.refine(known.bounds, t)?;
-        self.remember(Known { bounds, refined: true });
+        self.remember(Known { refined: Some(bounds), ..known });
         Ok(bounds)
     }
 
@@ -251,7 +252,7 @@ impl Motion<'_> {
         if let Some(known) = self.known.filter(|_| self.heat.operator_is_fixed()) {
             return Ok(known);
         }
-        let known = Known { bounds: self.proven_bounds(time, t)?, refined: false };
+        let known = Known { bounds: self.proven_bounds(time, t)?, refined: None };
         if !self.plan.leaves_out("decays") && self.heat.operator_is_fixed() {
             self.refuse_growing_modes(t)?;
         }

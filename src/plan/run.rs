@@ -1,5 +1,6 @@
 //! One step: prepare, stages on a private copy, check, commit. A step that fails has changed nothing.
 
+use super::input::Energy;
 use super::motion::explicit_limit;
 use super::state::{Input, State};
 use super::{Plan, Report};
@@ -53,8 +54,12 @@ impl State {
         self.timers.add("check", checked.elapsed());
 
         self.inputs[fields::T] = Input::Each(t);
+        if self.energy != Energy::Follows {
+            self.energy = Energy::Moved;
+        }
         self.time += dt;
         self.steps += 1;
+        self.was_done_here = true;
         report.time = self.time;
         report.applications = self.applications - applications;
         report.iterations = self.work.iterations - iterations;
@@ -68,7 +73,18 @@ impl State {
     /// Any error of [`State::prepare`]; `CallbackFailed`.
     pub fn rate(&mut self) -> Result<Vec<f64>> {
         self.cancel.store(false, Ordering::Relaxed);
+        // It counts for the plan, and only if it succeeds for what comes after.
+        let before = self.rates;
         self.rates += 1;
+        let rate = self.rate_now();
+        match &rate {
+            Ok(_) => self.was_done_here = true,
+            Err(_) => self.rates = before,
+        }
+        rate
+    }
+
+    fn rate_now(&mut self) -> Result<Vec<f64>> {
         let mut plan = self.prepare_fresh("rate")?;
         if !plan.leaves_out("used_once") {
             plan = self.prepare("rate")?;

@@ -21,6 +21,7 @@ impl Solver {
         self.state.cloud("get")?;
         expect(name, out.len(), self.len(), "one value per particle")?;
         expect(name, out.components(), components, "dim components for vectors, else 1")?;
+        self.state.settle_ties()?;
         let values = values(&mut self.state, field)?;
         let cloud = self.state.cloud("get")?;
         for (c, values) in values.iter().enumerate() {
@@ -50,7 +51,7 @@ impl Solver {
         let state = &mut self.state;
         let temperatures = |state: &State| -> Result<Vec<f64>> {
             state.cloud("get_number")?;
-            state.each(fields::T)
+            given(state, fields::T)
         };
         let moments = |state: &mut State, fold: fn(f64, f64) -> f64, start: f64| -> Result<f64> {
             Ok(prepared(state)?.moments.iter().copied().fold(start, fold))
@@ -59,7 +60,13 @@ impl Solver {
             "time" => state.time,
             "sigma_SB" => state.sigma_sb,
             "n" => state.len() as f64,
-            "energy" => state.energy(&temperatures(state)?),
+            "energy" => {
+                let t = temperatures(state)?;
+                for slot in [fields::M, fields::C_V] {
+                    needed(state, slot)?;
+                }
+                state.energy(&t)
+            }
             "T_min" => state.extrema(&temperatures(state)?).0,
             "T_max" => state.extrema(&temperatures(state)?).1,
             "limit" => state.limit()?,
@@ -79,6 +86,8 @@ impl Solver {
             "K_d2_min" => moments(state, f64::min, f64::INFINITY)?,
             "K_d2_max" => moments(state, f64::max, f64::NEG_INFINITY)?,
             "growth_rate" => {
+                // First, since it may put the particles in another order.
+                prepared(state)?;
                 let t = temperatures(state)?;
                 state.growth(&t)?
             }
@@ -123,9 +132,14 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
         "h" => memory::copied("h", &geometry(state)?.h)?,
         "area" => {
             geometry(state)?;
+            state.refuse_lost("get area", [fields::AREA])?;
             memory::collected("area", (0..n).map(|i| state.area(i)))?
         }
-        "u" => times_c_v(state, given(state, fields::T)?)?,
+        "u" => {
+            needed(state, fields::T)?;
+            needed(state, fields::C_V)?;
+            state.energies()?.view(n)?.into_owned()
+        }
         "dT_dt" => state.rate()?,
         "rate" => {
             let rate = state.rate()?;
@@ -139,8 +153,8 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
         }
         "order_reached" => orders(state)?,
         "omega" => {
-            let m = given(state, fields::M)?;
             geometry(state)?;
+            let m = given(state, fields::M)?;
             state.with_rows(|rows| density::omega(&state.choices.kernel, rows, &m, &state.pool))?
         }
         name => given(state, fields::slot(name)?)?,
@@ -150,11 +164,17 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
 
 /// An input as an array, or the error that says that it was not set.
 fn given(state: &State, slot: Slot) -> Result<Vec<f64>> {
+    needed(state, slot)?;
+    state.each(slot)
+}
+
+fn needed(state: &State, slot: Slot) -> Result<()> {
+    let name = FIELDS[slot].name;
+    state.refuse_lost(&format!("get {name}"), [slot])?;
     if state.inputs[slot] == Input::Unset && !state.is_empty() {
-        let name = FIELDS[slot].name;
         return Err(Error::OutOfOrder { call: format!("get {name}"), missing: format!("set {name}") });
     }
-    state.each(slot)
+    Ok(())
 }
 
 fn geometry(state: &mut State) -> Result<&crate::plan::state::Geometry> {
@@ -174,8 +194,8 @@ fn orders(state: &mut State) -> Result<Vec<f64>> {
 }
 
 fn gradient_of_t(state: &mut State) -> Result<Vec<Vec<f64>>> {
-    let t = given(state, fields::T)?;
     let volume = memory::copied("volumes", &geometry(state)?.volume)?;
+    let t = given(state, fields::T)?;
     let found = state.with_rows(|rows| gradient::of(&t, &state.choices.kernel, rows, &volume, &state.pool))?;
     columns(&found, state.dim())
 }

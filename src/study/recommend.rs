@@ -9,6 +9,7 @@ use super::norm::l2;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::operator::table;
+use crate::plan::applies::fitting;
 use crate::solver::Solver;
 use crate::solver::trial::Trial;
 use crate::words::replaced;
@@ -77,7 +78,7 @@ impl Reference {
         let (mut found, mut failed) = (Vec::new(), Error::Cancelled);
         for order in ORDERS {
             let words = exact_words(solver.dim(), order, tolerance)?;
-            match solver.attempt(&replaced(&line, &words, DROPPED), dt, Duration::MAX) {
+            match solver.attempt(&fitting(&replaced(&line, &words, DROPPED)), dt, Duration::MAX) {
                 Ok(trial) => found.extend(trial.map(|t| t.t)),
                 Err(e) if refused(&e) => failed = e,
                 Err(e) => return Err(e),
@@ -167,7 +168,7 @@ fn choices(solver: &Solver) -> Result<Vec<String>> {
             for h_fac in H_FACS.map(|h| h * default) {
                 for integrator in INTEGRATORS.iter().filter(|name| solvable || **name != "sdirk2") {
                     let words = format!("operator={operator} kernel={kernel} h_fac={h_fac:.2} integrator={integrator}");
-                    all.push(replaced(solver.words(), &words, DROPPED));
+                    all.push(fitting(&replaced(solver.words(), &words, DROPPED)));
                 }
             }
         }
