@@ -107,9 +107,9 @@ pub static RULES: &[Rule] = &[
     },
     Rule {
         name: "decays",
-        reason: "weights are the same from both sides of a pair, or growth was allowed: no check of the spectrum",
+        reason: "no mode of this operator grows, or growth was allowed: no check of the spectrum",
         same: Same::Bits,
-        holds: |f| !f.one_sided,
+        holds: |f| !f.may_have_growing_modes,
     },
     Rule {
         name: "positive",
