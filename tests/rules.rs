@@ -2,7 +2,7 @@
 
 mod particles;
 
-use diffusph::plan::rules::{RULES, Same};
+use diffusph::plan::rules::{self, RULES, Same};
 use diffusph::{Solver, Strided};
 use particles::*;
 
@@ -70,9 +70,9 @@ fn every_rule_has_a_scene_and_changes_nothing_but_the_work() {
     for rule in RULES {
         let scene = SCENES.iter().find(|s| s.rule == rule.name).unwrap_or_else(|| panic!("no scene for {}", rule.name));
         let (plan, with) = run(scene, "");
-        assert!(plan.leaves_out(rule.name), "{} does not hold in its scene:\n{plan}", rule.name);
+        assert!(plan.leaves_out(rule), "{} does not hold in its scene:\n{plan}", rule.name);
         let (plan, without) = run(scene, &format!(" without={}", rule.name));
-        assert!(!plan.leaves_out(rule.name) && plan.disabled.iter().any(|r| r.name == rule.name), "{plan}");
+        assert!(!plan.leaves_out(rule) && plan.disabled.iter().any(|r| r.name == rule.name), "{plan}");
         match rule.same {
             Same::Bits => assert_eq!(bits(&with), bits(&without), "{}", rule.name),
             // Sums of some twenty terms in another grouping.
@@ -101,12 +101,12 @@ fn moving_particles_and_changing_kappa_are_noticed() {
     set(&mut s, "T", &field(&x, 2, |p| p[0]));
     s.step(1e-5).unwrap();
     let plan = s.plan().unwrap();
-    assert!(plan.leaves_out("at_rest") && plan.leaves_out("frozen"));
+    assert!(plan.leaves_out(&rules::AT_REST) && plan.leaves_out(&rules::FROZEN));
     let moved: Vec<f64> = x.iter().map(|x| x + 1e-3).collect();
     s.set_particles(Strided::new("x", &moved, 400, 2, 2).unwrap()).unwrap();
     set(&mut s, "kappa", &field(&x, 2, |p| 2.0 + p[1]));
     let plan = s.plan().unwrap();
-    assert!(!plan.leaves_out("at_rest") && !plan.leaves_out("frozen"));
+    assert!(!plan.leaves_out(&rules::AT_REST) && !plan.leaves_out(&rules::FROZEN));
     let before = s.get_all("T").unwrap();
     s.step(1e-5).unwrap();
 

@@ -2,7 +2,7 @@
 
 use super::report::{Report, Timers};
 use super::state::Progress;
-use super::{Choices, Plan};
+use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Schedule, Shifted, System, Work};
 use crate::memory;
@@ -205,7 +205,7 @@ impl Motion<'_> {
 
     fn schedule(&self, dt: f64, bounds: Bounds) -> Result<(&'static Method, Schedule)> {
         let (method, options) = (self.choices.method, &self.choices.options);
-        if self.plan.leaves_out("one_stage") && options.stages.is_none() && dt <= explicit_limit(bounds) {
+        if self.plan.leaves_out(&rules::ONE_STAGE) && options.stages.is_none() && dt <= explicit_limit(bounds) {
             let euler = integrator::find("euler")?;
             return Ok((euler, euler.schedule(dt, bounds, options)?));
         }
@@ -216,7 +216,7 @@ impl Motion<'_> {
     pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
         let start = Instant::now();
         let known = self.known_or_proven(time, t)?;
-        let enough = self.plan.leaves_out("proven_bound") && self.is_least_work(dt, known.bounds);
+        let enough = self.plan.leaves_out(&rules::PROVEN_BOUND) && self.is_least_work(dt, known.bounds);
         let bounds = if enough { known.bounds } else { self.refined(known, t)? };
         self.timers.add("bound", start.elapsed());
         Ok(bounds)
@@ -252,7 +252,7 @@ impl Motion<'_> {
             return Ok(known);
         }
         let known = Known { bounds: self.proven_bounds(time, t)?, refined: false };
-        if !self.plan.leaves_out("decays") && self.heat.operator_is_fixed() {
+        if !self.plan.leaves_out(&rules::DECAYS) && self.heat.operator_is_fixed() {
             self.refuse_growing_modes(t)?;
         }
         self.remember(known);

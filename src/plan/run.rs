@@ -2,7 +2,7 @@
 
 use super::motion::explicit_limit;
 use super::state::{Input, State};
-use super::{Plan, Report};
+use super::{Plan, Report, rules};
 use crate::error::{Error, Result};
 use crate::integrator::Bounds;
 use crate::memory;
@@ -33,7 +33,7 @@ impl State {
         }
         self.cancel.store(false, Ordering::Relaxed);
         let start = Instant::now();
-        if self.choices.without("at_rest") && self.steps > 0 {
+        if self.choices.without(&rules::AT_REST) && self.steps > 0 {
             self.forget_geometry();
         }
         let mut plan = self.prepare("step")?;
@@ -70,13 +70,13 @@ impl State {
         self.cancel.store(false, Ordering::Relaxed);
         self.rates += 1;
         let mut plan = self.prepare_fresh("rate")?;
-        if !plan.leaves_out("used_once") {
+        if !plan.leaves_out(&rules::USED_ONCE) {
             plan = self.prepare("rate")?;
         }
         let (t, time) = (self.each(fields::T)?, self.time);
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
         self.with_motion(&plan, |motion| {
-            if !plan.leaves_out("rate_only") {
+            if !plan.leaves_out(&rules::RATE_ONLY) {
                 motion.bounds(time, 0.0, &t)?;
             }
             motion.heat.rate(time, &t, &mut rate)
@@ -128,7 +128,7 @@ impl State {
     /// Whether the norm of T is to be checked: nothing heats, and the operator does not rule growth out.
     fn may_grow(&self, plan: &Plan) -> bool {
         let isolated = self.exchanging() == 0 && !self.heated() && self.inputs[fields::FIXED] == Input::Number(0.0);
-        isolated && !plan.leaves_out("positive")
+        isolated && !plan.leaves_out(&rules::POSITIVE)
     }
 
     /// The norm of T − mean(T), weighted by capacity: what diffusion can only lower.
