@@ -75,7 +75,7 @@ impl State {
             return Ok(false);
         }
         let (t, time) = (self.each(fields::T)?, self.time);
-        let bounds = self.with_motion(plan, |motion| Ok(motion.known_or_proven(time, &t)?.bounds))?;
+        let bounds = self.with_motion(plan, |motion| Ok(motion.known_or_proven(time, &t)?.proven))?;
         let (stiffness, choices) = (dt / explicit_limit(bounds), &mut self.choices);
         let (controlled, solvable) = (choices.tolerance.is_some(), choices.operator.dissipative);
         let Some(auto) = &mut choices.auto else { return Ok(false) };

@@ -30,11 +30,15 @@ pub struct Motion<'a> {
     pub known: &'a mut Option<Known>,
 }
 
-/// Bounds on an operator, and whether power iteration has lowered them.
+/// Bounds on an operator.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
-    pub bounds: Bounds,
-    refined: bool,
+    /// Gershgorin's: what every step finds first, whatever steps were before it.
+    pub proven: Bounds,
+    /// The same, lowered by power iteration, where that was needed.
+    refined: Option<Bounds>,
+    /// No bound on the spectrum can be less.
+    floor: f64,
 }
 
 impl System for Heat<'_> {
@@ -125,7 +129,7 @@ impl Motion<'_> {
             return Ok(());
         }
         let start = Instant::now();
-        report.limit = explicit_limit(self.known_or_proven(time, t)?.bounds);
+        report.limit = explicit_limit(self.known_or_proven(time, t)?.proven);
         method.advance(&schedule, &mut self.heat, self.pool, time, t, self.work)?;
         self.timers.add("solve", start.elapsed());
         (report.substeps, report.stages) = (1, schedule.stages.into());
@@ -140,7 +144,7 @@ impl Motion<'_> {
         let bounds = self.stability(time, dt, t)?;
         let mut schedule = method.schedule(dt, bounds, options)?;
         report.limit =
-            explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.bounds } else { bounds });
+            explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.proven } else { bounds });
         let control = Control { method, tolerance };
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
         let mut done = 0.0;
@@ -186,15 +190,24 @@ impl Motion<'_> {
     /// practical step limit of Caplan et al. 2024 has the same purpose). Never below what three stages can do, less
     /// some rounding that would ask for five.
     fn practical_limit(&mut self, time: f64, t: &[f64], bounds: Bounds, reference: f64) -> Result<f64> {
-        let (method, options) = (self.choices.method, &self.choices.options);
-        if !method.is_stabilised() || options.stages.is_some() || self.choices.change.is_infinite() {
+        if !self.follows_t() {
             return Ok(f64::INFINITY);
         }
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
         self.heat.rate(time, t, &mut rate)?;
         let speed = self.norm(|i| rate[i]);
-        let least = method.limit(bounds) * (1.0 - 4.0 * f64::EPSILON);
-        Ok((self.choices.change * reference / speed).max(least))
+        Ok((self.choices.change * reference / speed).max(self.shortest(bounds)))
+    }
+
+    /// Whether sub-steps are cut by how fast T changes.
+    fn follows_t(&self) -> bool {
+        let pinned = self.choices.options.stages.is_some();
+        self.choices.method.is_stabilised() && !pinned && self.choices.change.is_finite()
+    }
+
+    /// The shortest sub-step that T asks for: what the fewest stages can do.
+    fn shortest(&self, bounds: Bounds) -> f64 {
+        self.choices.method.limit(bounds) * (1.0 - 4.0 * f64::EPSILON)
     }
 
     /// The spread of a quantity over the volume.
@@ -216,8 +229,8 @@ impl Motion<'_> {
     pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
         let start = Instant::now();
         let known = self.known_or_proven(time, t)?;
-        let enough = self.plan.leaves_out(&rules::PROVEN_BOUND) && self.is_least_work(dt, known.bounds);
-        let bounds = if enough { known.bounds } else { self.refined(known, t)? };
+        let enough = self.plan.leaves_out(&rules::PROVEN_BOUND) && self.is_least_work(dt, known);
+        let bounds = if enough { known.proven } else { self.refined(known, t)? };
         self.timers.add("bound", start.elapsed());
         Ok(bounds)
     }
@@ -229,21 +242,21 @@ impl Motion<'_> {
     }
 
     fn refined(&mut self, known: Known, t: &[f64]) -> Result<Bounds> {
-        if known.refined {
-            return Ok(known.bounds);
+        if let Some(bounds) = known.refined {
+            return Ok(bounds);
         }
-        let bounds = self.refine(known.bounds, t)?;
-        self.remember(Known { bounds, refined: true });
+        let bounds = self.refine(known, t)?;
+        self.remember(Known { refined: Some(bounds), ..known });
         Ok(bounds)
     }
 
-    /// The largest eigenvalue is at least the largest diagonal element: a bound that asks for no more work than that
-    /// need not be refined.
-    fn is_least_work(&self, dt: f64, bounds: Bounds) -> bool {
-        let (method, options) = (self.choices.method, &self.choices.options);
-        let least = method.schedule(dt, Bounds { spectral: bounds.diagonal, ..bounds }, options);
-        let applications = |s: Result<Schedule>| s.map_or(u64::MAX, |s| s.applications());
-        applications(method.schedule(dt, bounds, options)) <= applications(least)
+    /// Whether the proven bound asks for the very sub-steps that the least possible one asks for, and with it every
+    /// bound between them.
+    fn is_least_work(&self, dt: f64, known: Known) -> bool {
+        let least = Bounds { spectral: known.floor, ..known.proven };
+        let steps = |bounds| self.schedule(dt, bounds).ok().map(|(method, s)| (method.name, s.substeps, s.stages));
+        let uncut = !self.follows_t() || dt <= self.shortest(known.proven);
+        uncut && steps(known.proven).is_some_and(|proven| steps(least) == Some(proven))
     }
 
     /// The best bounds that cost no more than one application: for a report, or a choice between methods.
@@ -251,8 +264,8 @@ impl Motion<'_> {
         if let Some(known) = self.known.filter(|_| self.heat.operator_is_fixed()) {
             return Ok(known);
         }
-        let known = Known { bounds: self.proven_bounds(time, t)?, refined: false };
-        if !self.plan.leaves_out(&rules::DECAYS) && self.heat.operator_is_fixed() {
+        let known = self.proven(time, t)?;
+        if !self.plan.leaves_out(&rules::DECAYS) && self.heat.has_spectrum() {
             self.refuse_growing_modes(t)?;
         }
         self.remember(known);
@@ -276,7 +289,7 @@ impl Motion<'_> {
         let start = Instant::now();
         let (growth, fastest) = self.growth(t)?;
         self.timers.add("spectrum", start.elapsed());
-        if growth <= GROWS * fastest {
+        if growth <= GROWS * fastest || self.choices.allow_unstable {
             return Ok(());
         }
         let operator = self.choices.operator.name;
@@ -295,24 +308,28 @@ impl Motion<'_> {
     }
 
     /// Gershgorin's bounds: proven, for any operator and any kappa.
-    fn proven_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+    pub fn proven(&mut self, time: f64, t: &[f64]) -> Result<Known> {
+        let start = Instant::now();
         let circles = self.heat.circles(time, t)?;
         let largest = |of: fn(&(f64, f64)) -> f64| sum::max(self.pool, circles.len(), |i| of(&circles[i])).max(0.0);
-        let bounds = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
-        match bounds.spectral.is_finite() {
-            true => Ok(bounds),
+        let proven = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
+        // An eigenvalue of a symmetric operator is at least the largest diagonal element; of others nothing is known.
+        let floor = if self.choices.operator.dissipative { largest(|c| c.1) } else { 0.0 };
+        self.timers.add("circles", start.elapsed());
+        match proven.spectral.is_finite() {
+            true => Ok(Known { proven, refined: None, floor }),
             false => Err(Error::bad("kappa", "too large", "its product with the pair weights exceeds all numbers")),
         }
     }
 
     /// The same, lowered by power iteration. Exchange with the surroundings is linearised.
-    fn refine(&mut self, proven: Bounds, t: &[f64]) -> Result<Bounds> {
+    fn refine(&mut self, Known { proven, floor, .. }: Known, t: &[f64]) -> Result<Bounds> {
         if proven.spectral == 0.0 {
             return Ok(proven);
         }
         let weight = self.linearise_about(t)?;
         let spectral = spectrum::largest(self.pool, &weight, proven.spectral, |x, y| self.heat.linear(x, y))?;
-        Ok(Bounds { spectral, ..proven })
+        Ok(Bounds { spectral: spectral.max(floor), ..proven })
     }
 
     fn tell(&mut self, time: f64, dt: f64, done: f64) -> Result<()> {

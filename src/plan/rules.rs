@@ -98,7 +98,7 @@ table! {
     };
     PROVEN_BOUND = Rule {
         name: "proven_bound",
-        reason: "where Gershgorin's bound asks for no more stages than any bound would, no power iteration",
+        reason: "where Gershgorin's bound asks for the same sub-steps as any lower one could, no power iteration",
         same: Same::Bits,
         holds: |f| !f.implicit,
     };
@@ -122,9 +122,9 @@ table! {
     };
     DECAYS = Rule {
         name: "decays",
-        reason: "weights are the same from both sides of a pair, or growth was allowed: no check of the spectrum",
+        reason: "no mode of the operator can grow, or growth was allowed: no check of the spectrum",
         same: Same::Bits,
-        holds: |f| !f.one_sided,
+        holds: |f| !f.may_grow,
     };
     POSITIVE = Rule {
         name: "positive",

@@ -33,9 +33,7 @@ impl State {
         }
         self.cancel.store(false, Ordering::Relaxed);
         let start = Instant::now();
-        if self.choices.without(&rules::AT_REST) && self.steps > 0 {
-            self.forget_geometry();
-        }
+        self.set_anew()?;
         let mut plan = self.prepare("step")?;
         if self.choose(&plan, dt)? {
             plan = self.prepare("step")?;
@@ -68,16 +66,18 @@ impl State {
     /// Any error of [`State::prepare`]; `CallbackFailed`.
     pub fn rate(&mut self) -> Result<Vec<f64>> {
         self.cancel.store(false, Ordering::Relaxed);
+        self.set_anew()?;
         self.rates += 1;
         let mut plan = self.prepare_fresh("rate")?;
-        if !plan.leaves_out(&rules::USED_ONCE) {
+        // A bound wants stored weights.
+        if !(plan.leaves_out(&rules::USED_ONCE) && plan.leaves_out(&rules::RATE_ONLY)) {
             plan = self.prepare("rate")?;
         }
         let (t, time) = (self.each(fields::T)?, self.time);
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
         self.with_motion(&plan, |motion| {
             if !plan.leaves_out(&rules::RATE_ONLY) {
-                motion.bounds(time, 0.0, &t)?;
+                motion.proven(time, &t)?;
             }
             motion.heat.rate(time, &t, &mut rate)
         })?;
@@ -120,7 +120,7 @@ impl State {
         (sum::min(&self.pool, t.len(), |i| t[i]), sum::max(&self.pool, t.len(), |i| t[i]))
     }
 
-    fn before(&self, plan: &Plan, t: &[f64]) -> Before {
+    fn before(&mut self, plan: &Plan, t: &[f64]) -> Before {
         let (low, high) = self.extrema(t);
         Before { low, high, spread: if self.may_grow(plan) { self.spread(t) } else { 0.0 } }
     }
@@ -132,10 +132,10 @@ impl State {
     }
 
     /// The norm of T − mean(T), weighted by capacity: what diffusion can only lower.
-    fn spread(&self, t: &[f64]) -> f64 {
-        let Some(inverse) = &self.inverse_capacity else { return 0.0 };
+    fn spread(&mut self, t: &[f64]) -> f64 {
+        let (Some(inverse), pool) = (&self.inverse_capacity, &self.pool) else { return 0.0 };
         let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
-        sum::spread(&self.pool, t.len(), weight, |i| t[i])
+        self.timers.time("norm", || sum::spread(pool, t.len(), weight, |i| t[i]))
     }
 
     /// The host's number of a particle.
@@ -150,7 +150,7 @@ impl State {
         }
     }
 
-    fn check(&self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
+    fn check(&mut self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
         self.refuse_what_is_not_finite("T", t)?;
         let slack = ROUNDING * before.high.abs().max(before.low.abs()) + self.work.slack;
         if self.may_grow(plan) {
