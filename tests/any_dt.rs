@@ -271,7 +271,8 @@ fn where_nothing_changes_a_step_is_one() {
     // A last digit of noise, heated as a whole, costs little more than the heating.
     let mut s = unit_box("", &x, 2, true);
     let mut random = Random(3);
-    set(&mut s, "T", &(0..s.len()).map(|_| 300.0 + 1e-9 * random.next()).collect::<Vec<_>>());
+    let noise: Vec<f64> = (0..s.len()).map(|_| 300.0 + 1e-9 * random.next()).collect();
+    set(&mut s, "T", &noise);
     let dt = 1e4 * s.limit().unwrap();
     s.set_number("source", 1.0 / dt).unwrap();
     let report = s.step(dt).unwrap();

@@ -166,8 +166,13 @@ impl Heat<'_> {
 
     /// Whether the rate is a linear function of T.
     pub fn is_linear(&self) -> bool {
+        !matches!(self.release, Release::Host(..)) && self.has_spectrum()
+    }
+
+    /// Whether the operator is a linear one that stays the same while T changes.
+    pub fn has_spectrum(&self) -> bool {
         let limited = matches!(self.pairs, Pairs::Twice(twice, _) if twice.is_limited());
-        !limited && !matches!(self.release, Release::Host(..)) && self.operator_is_fixed()
+        !limited && self.operator_is_fixed()
     }
 
     /// Whether the operator stays the same while T changes.

@@ -69,7 +69,7 @@ impl State {
         }
         let (t, time) = (self.each(fields::T)?, self.time);
         let bounds = self.with_motion(plan, |motion| {
-            let known = motion.known_or_proven(time, &t)?.bounds;
+            let known = motion.known_or_proven(time, &t)?.proven;
             motion.with_cooling(known, time, &t)
         })?;
         let (stiffness, choices) = (dt / explicit_limit(bounds), &mut self.choices);

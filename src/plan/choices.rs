@@ -2,7 +2,7 @@
 
 use super::auto::{self, Auto};
 use super::preconditioner::{self, Preconditioner};
-use super::rules::RULES;
+use super::rules::{RULES, Rule};
 use crate::error::{Error, Result};
 use crate::integrator::{self, Method, Options};
 use crate::kernel::Kernel;
@@ -124,7 +124,7 @@ pub struct Choices {
     pub preconditioner: Preconditioner,
     pub threads: usize,
     pub memory: Option<u64>,
-    without: Vec<String>,
+    without: Vec<&'static Rule>,
 }
 
 impl Choices {
@@ -213,8 +213,8 @@ impl Choices {
     }
 
     /// Whether a rule is switched off.
-    pub fn without(&self, rule: &str) -> bool {
-        self.without.iter().any(|w| w == rule)
+    pub fn without(&self, rule: &Rule) -> bool {
+        self.without.contains(&rule)
     }
 }
 
@@ -266,19 +266,15 @@ fn tolerance(words: &mut Words, default: Option<f64>) -> Result<Option<f64>> {
     }
 }
 
-fn without(list: Option<&str>) -> Result<Vec<String>> {
-    let known = || RULES.iter().map(|r| r.name);
-    let names = list.into_iter().flat_map(|l| l.split(','));
-    names
-        .map(|name| match known().find(|k| *k == name) {
-            Some(rule) => Ok(rule.to_string()),
-            None => Err(Error::unknown("rule", name, known())),
-        })
-        .collect()
+fn without(list: Option<&str>) -> Result<Vec<&'static Rule>> {
+    let find = |name: &str| RULES.iter().copied().find(|r| r.name == name);
+    let unknown = |name: &str| Error::unknown("rule", name, RULES.iter().map(|r| r.name));
+    list.into_iter().flat_map(|l| l.split(',')).map(|name| find(name).ok_or_else(|| unknown(name))).collect()
 }
 
 #[cfg(test)]
 mod tests {
+    use super::super::rules;
     use super::*;
 
     #[test]
@@ -288,7 +284,7 @@ mod tests {
         );
         let c = c.unwrap();
         assert_eq!((c.kernel.name(), c.kernel.dim(), c.operator.name, c.normalise), ("C4", 2, "kernel", false));
-        assert!(c.without("same_h") && !c.without("at_rest"));
+        assert!(c.without(&rules::SAME_H) && !c.without(&rules::AT_REST));
         for (line, expected) in [
             ("", "unknown model"),
             ("heet", "did you mean 'heat'"),

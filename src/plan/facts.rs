@@ -32,8 +32,8 @@ pub struct Facts {
     pub twice: bool,
     /// A weight depends on more than the row that it is in.
     pub joined: bool,
-    /// Nothing rules modes out that grow, and they are refused.
-    pub may_have_growing_modes: bool,
+    /// Nothing about the operator rules out modes that grow, and they are refused.
+    pub may_grow: bool,
     /// The operator has no negative weight.
     pub positive: bool,
     /// T stays where the maximum principle has it.

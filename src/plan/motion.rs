@@ -2,7 +2,7 @@
 
 use super::report::{Report, Timers};
 use super::state::Progress;
-use super::{Choices, Plan};
+use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Range, Schedule, Shifted, System, Work};
 use crate::memory;
@@ -35,11 +35,15 @@ pub struct Motion<'a> {
     pub range: Range,
 }
 
-/// Bounds on an operator, and whether power iteration has lowered them.
+/// Bounds on an operator.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
-    pub bounds: Bounds,
-    refined: bool,
+    /// Gershgorin's: what every step finds first, whatever steps were before it.
+    pub proven: Bounds,
+    /// The same, lowered by power iteration, where that was needed.
+    refined: Option<Bounds>,
+    /// No bound on the spectrum can be less.
+    floor: f64,
 }
 
 impl System for Heat<'_> {
@@ -92,6 +96,11 @@ fn fine<'a>(pool: &'a Pool, Shifted { g, diagonal, weight }: Shifted<'a>) -> Fin
 /// The largest explicit Euler step that is stable under these bounds; infinite where nothing diffuses.
 pub fn explicit_limit(bounds: Bounds) -> f64 {
     2.0 / bounds.spectral
+}
+
+/// Bounds on an operator to which a decay at this rate is added everywhere.
+fn raised(bounds: Bounds, rate: f64) -> Bounds {
+    Bounds { spectral: bounds.spectral + rate, diagonal: bounds.diagonal + rate }
 }
 
 impl Motion<'_> {
@@ -154,7 +163,7 @@ impl Motion<'_> {
         let (method, options) = (choices.method, &choices.options);
         let bounds = self.stability(time, dt, t)?;
         report.limit =
-            explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.bounds } else { bounds });
+            explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.proven } else { bounds });
         let control = Control { method, tolerance: choices.tolerance, range: self.range };
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
         if pace.is_still() && self.heat.is_autonomous() {
@@ -278,7 +287,7 @@ impl Motion<'_> {
     fn schedule(&self, dt: f64, bounds: Bounds) -> Result<(&'static Method, Schedule)> {
         let (method, options) = (self.choices.method, &self.choices.options);
         let alone = options.stages.is_none() && self.choices.tolerance.is_none();
-        if self.plan.leaves_out("one_stage") && alone && dt <= explicit_limit(bounds) {
+        if self.plan.leaves_out(&rules::ONE_STAGE) && alone && dt <= explicit_limit(bounds) {
             let euler = integrator::find("euler")?;
             return Ok((euler, euler.schedule(dt, bounds, options)?));
         }
@@ -289,9 +298,10 @@ impl Motion<'_> {
     pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
         let start = Instant::now();
         let known = self.known_or_proven(time, t)?;
-        let enough = self.plan.leaves_out("proven_bound") && self.is_least_work(dt, known.bounds);
-        let bounds = if enough { known.bounds } else { self.refined(known, time, t)? };
-        let bounds = self.with_cooling(bounds, time, t)?;
+        let cooling = self.fastest_cooling(time, t)?;
+        let enough = self.plan.leaves_out(&rules::PROVEN_BOUND) && self.is_least_work(dt, known, cooling);
+        let bounds = if enough { known.proven } else { self.refined(known, time, t)? };
+        let bounds = raised(bounds, cooling);
         self.timers.add("bound", start.elapsed());
         Ok(bounds)
     }
@@ -305,27 +315,32 @@ impl Motion<'_> {
 
     /// Bounds with what a source of the host's adds to them, which is looked at anew each time.
     pub fn with_cooling(&mut self, bounds: Bounds, time: f64, t: &[f64]) -> Result<Bounds> {
+        Ok(raised(bounds, self.fastest_cooling(time, t)?))
+    }
+
+    fn fastest_cooling(&mut self, time: f64, t: &[f64]) -> Result<f64> {
         let cooling = self.heat.cooling(time, t)?;
-        let fastest = sum::max(self.pool, cooling.len(), |i| cooling[i]).max(0.0);
-        Ok(Bounds { spectral: bounds.spectral + fastest, diagonal: bounds.diagonal + fastest })
+        Ok(sum::max(self.pool, cooling.len(), |i| cooling[i]).max(0.0))
     }
 
     fn refined(&mut self, known: Known, time: f64, t: &[f64]) -> Result<Bounds> {
-        if known.refined {
-            return Ok(known.bounds);
+        if let Some(bounds) = known.refined {
+            return Ok(bounds);
         }
-        let bounds = self.refine(known.bounds, time, t)?;
-        self.remember(Known { bounds, refined: true });
+        let bounds = self.refine(known, time, t)?;
+        self.remember(Known { refined: Some(bounds), ..known });
         Ok(bounds)
     }
 
-    /// The largest eigenvalue is at least the largest diagonal element: a bound that asks for no more work than that
-    /// need not be refined.
-    fn is_least_work(&self, dt: f64, bounds: Bounds) -> bool {
-        let (method, options) = (self.choices.method, &self.choices.options);
-        let least = method.schedule(dt, Bounds { spectral: bounds.diagonal, ..bounds }, options);
-        let applications = |s: Result<Schedule>| s.map_or(u64::MAX, |s| s.applications());
-        applications(method.schedule(dt, bounds, options)) <= applications(least)
+    /// Whether the proven bound asks for the very sub-steps that the least possible one asks for, and with it every
+    /// bound between them.
+    fn is_least_work(&self, dt: f64, known: Known, cooling: f64) -> bool {
+        let least = Bounds { spectral: known.floor, ..known.proven };
+        let steps = |bounds| {
+            let scheduled = self.schedule(dt, raised(bounds, cooling)).ok();
+            scheduled.map(|(method, s)| (method.name, s.substeps, s.stages))
+        };
+        steps(known.proven).is_some_and(|proven| steps(least) == Some(proven))
     }
 
     /// The best bounds that cost no more than one application: for a report, or a choice between methods.
@@ -333,8 +348,8 @@ impl Motion<'_> {
         if let Some(known) = self.known.filter(|_| self.heat.operator_is_fixed()) {
             return Ok(known);
         }
-        let known = Known { bounds: self.proven_bounds(time, t)?, refined: false };
-        if !self.plan.leaves_out("decays") && self.heat.operator_is_fixed() {
+        let known = self.proven(time, t)?;
+        if !self.plan.leaves_out(&rules::DECAYS) && self.heat.has_spectrum() {
             self.refuse_growing_modes(time, t)?;
         }
         self.remember(known);
@@ -358,7 +373,7 @@ impl Motion<'_> {
         let start = Instant::now();
         let (growth, fastest) = self.growth(time, t)?;
         self.timers.add("spectrum", start.elapsed());
-        if growth <= GROWS * fastest {
+        if growth <= GROWS * fastest || self.choices.allow_unstable {
             return Ok(());
         }
         let operator = self.choices.operator.name;
@@ -377,24 +392,28 @@ impl Motion<'_> {
     }
 
     /// Gershgorin's bounds: proven, for any operator and any kappa.
-    fn proven_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+    pub fn proven(&mut self, time: f64, t: &[f64]) -> Result<Known> {
+        let start = Instant::now();
         let circles = self.heat.circles(time, t)?;
         let largest = |of: fn(&(f64, f64)) -> f64| sum::max(self.pool, circles.len(), |i| of(&circles[i])).max(0.0);
-        let bounds = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
-        match bounds.spectral.is_finite() {
-            true => Ok(bounds),
+        let proven = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
+        // An eigenvalue of a symmetric operator is at least the largest diagonal element; of others nothing is known.
+        let floor = if self.choices.operator.dissipative { largest(|c| c.1) } else { 0.0 };
+        self.timers.add("circles", start.elapsed());
+        match proven.spectral.is_finite() {
+            true => Ok(Known { proven, refined: None, floor }),
             false => Err(Error::bad("kappa", "too large", "its product with the pair weights exceeds all numbers")),
         }
     }
 
     /// The same, lowered by power iteration. Exchange with the surroundings is linearised.
-    fn refine(&mut self, proven: Bounds, time: f64, t: &[f64]) -> Result<Bounds> {
+    fn refine(&mut self, Known { proven, floor, .. }: Known, time: f64, t: &[f64]) -> Result<Bounds> {
         if proven.spectral == 0.0 {
             return Ok(proven);
         }
         let weight = self.linearise_about(time, t)?;
         let spectral = spectrum::largest(self.pool, &weight, proven.spectral, |x, y| self.heat.linear(x, y))?;
-        Ok(Bounds { spectral, ..proven })
+        Ok(Bounds { spectral: spectral.max(floor), ..proven })
     }
 
     fn tell(&mut self, time: f64, dt: f64, done: f64) -> Result<()> {

@@ -3,7 +3,7 @@
 use super::choices::Promise;
 use super::motion::explicit_limit;
 use super::state::{Input, State};
-use super::{Plan, Report};
+use super::{Plan, Report, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{Bounds, Range};
 use crate::memory;
@@ -39,9 +39,7 @@ impl State {
         }
         self.cancel.store(false, Ordering::Relaxed);
         let start = Instant::now();
-        if self.choices.without("at_rest") && self.steps > 0 {
-            self.forget_geometry();
-        }
+        self.set_anew()?;
         let mut plan = self.prepare("step")?;
         if self.choose(&plan, dt)? {
             plan = self.prepare("step")?;
@@ -79,16 +77,18 @@ impl State {
     /// Any error of [`State::prepare`]; `CallbackFailed`.
     pub fn rate(&mut self) -> Result<Vec<f64>> {
         self.cancel.store(false, Ordering::Relaxed);
+        self.set_anew()?;
         self.rates += 1;
         let mut plan = self.prepare_fresh("rate")?;
-        if !plan.leaves_out("used_once") {
+        // A bound wants stored weights.
+        if !(plan.leaves_out(&rules::USED_ONCE) && plan.leaves_out(&rules::RATE_ONLY)) {
             plan = self.prepare("rate")?;
         }
         let (t, time) = (self.each(fields::T)?, self.time);
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
         self.with_motion(&plan, |motion| {
-            if !plan.leaves_out("rate_only") {
-                motion.bounds(time, 0.0, &t)?;
+            if !plan.leaves_out(&rules::RATE_ONLY) {
+                motion.proven(time, &t)?;
             }
             motion.heat.rate(time, &t, &mut rate)
         })?;
@@ -168,14 +168,14 @@ impl State {
     /// Whether the norm of T is to be checked: nothing heats, and the operator does not rule growth out.
     fn may_grow(&self, plan: &Plan) -> bool {
         let isolated = self.exchanging() == 0 && !self.heated() && self.inputs[fields::FIXED] == Input::Number(0.0);
-        isolated && !plan.leaves_out("positive")
+        isolated && !plan.leaves_out(&rules::POSITIVE)
     }
 
     /// The norm of T − mean(T), weighted by capacity: what diffusion can only lower.
-    fn spread(&self, t: &[f64]) -> f64 {
-        let Some(inverse) = &self.inverse_capacity else { return 0.0 };
+    fn spread(&mut self, t: &[f64]) -> f64 {
+        let (Some(inverse), pool) = (&self.inverse_capacity, &self.pool) else { return 0.0 };
         let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
-        sum::spread(&self.pool, t.len(), weight, |i| t[i])
+        self.timers.time("norm", || sum::spread(pool, t.len(), weight, |i| t[i]))
     }
 
     /// The host's number of a particle.
@@ -190,7 +190,7 @@ impl State {
         }
     }
 
-    fn check(&self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
+    fn check(&mut self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
         self.refuse_what_is_not_finite("T", t)?;
         let slack = ROUNDING * before.size + self.work.slack;
         if self.may_grow(plan) {

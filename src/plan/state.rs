@@ -5,7 +5,7 @@ use super::choices::Promise;
 use super::motion::Known;
 use super::preconditioner::Preconditioning;
 use super::report::Timers;
-use super::{Choices, Facts};
+use super::{Choices, Facts, rules};
 use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::integrator::{Range, Work};
@@ -119,6 +119,8 @@ pub struct State {
     pub geometry: Option<Geometry>,
     /// The smoothing lengths found last, in the host's order: where particles move a little, the next are near.
     pub last_h: Vec<f64>,
+    /// For which reach positions were sorted when they were set.
+    first_reach: f64,
     pub weights: Option<Weights>,
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
@@ -157,6 +159,7 @@ impl State {
             directions: None,
             geometry: None,
             last_h: Vec::new(),
+            first_reach: 0.0,
             weights: None,
             inverse_capacity: None,
             surface: None,
@@ -203,6 +206,7 @@ impl State {
             self.domain = old;
             return moved;
         }
+        self.first_reach = 0.0;
         self.drop_geometry();
         Ok(())
     }
@@ -215,6 +219,7 @@ impl State {
         let reach = self.reach(x);
         let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
         self.place(cloud)?;
+        self.first_reach = reach;
         self.drop_geometry();
         Ok(())
     }
@@ -309,11 +314,21 @@ impl State {
         self.forget_geometry();
     }
 
-    /// Makes the next step build everything anew.
-    pub fn forget_geometry(&mut self) {
+    fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
         self.surface = None;
         self.forget_operator();
+    }
+
+    /// What a step does again where `without=at_rest` asks for it: sorts, and makes all that follows, as if the same
+    /// positions had just been set.
+    pub fn set_anew(&mut self) -> Result<()> {
+        if self.choices.without(&rules::AT_REST) && self.steps + self.rates > 0 {
+            self.sort_again(self.first_reach)?;
+            self.last_h.clear();
+            self.forget_geometry();
+        }
+        Ok(())
     }
 
     /// Makes the next step look at the operator anew.
@@ -416,7 +431,7 @@ impl State {
             normalised: choices.normalise,
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
             twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
-            may_have_growing_modes: !positive && !choices.operator.dissipative && !choices.allow_unstable,
+            may_grow: !positive && !choices.operator.dissipative && !choices.allow_unstable,
             joined: choices.operator.joins_rows(),
             positive,
             keeps_bounds: choices.bounds == Promise::Kept && self.source_host.is_none(),
