@@ -32,11 +32,11 @@ pub struct Facts {
     pub twice: bool,
     /// A weight depends on more than the row that it is in.
     pub joined: bool,
-    /// Weights differ from the two sides of a pair, and modes that grow are refused.
-    pub one_sided: bool,
+    /// Nothing about the operator rules out modes that grow, and they are refused.
+    pub may_grow: bool,
     /// The operator has no negative weight.
     pub positive: bool,
-    /// The integrator promises the maximum principle, and nothing heats.
+    /// T stays where the maximum principle has it.
     pub keeps_bounds: bool,
     pub operator: &'static str,
     pub integrator: &'static str,

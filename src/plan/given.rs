@@ -124,6 +124,11 @@ impl State {
         if self.is_empty() || self.cloud.as_ref().is_none_or(|cloud| cloud.suits(reach)) || !reach.is_finite() {
             return self.settle_ties();
         }
+        self.sort_again(reach)
+    }
+
+    /// Sorts for a search that reaches this far.
+    pub fn sort_again(&mut self, reach: f64) -> Result<()> {
         let Some(x) = self.positions()? else { return Ok(()) };
         let x = Strided::new("x", &x, self.len(), self.dim(), self.dim())?;
         let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
@@ -217,11 +222,8 @@ impl State {
         if lost.is_empty() || self.is_empty() {
             return Ok(());
         }
-        let what = format!(
-            "{} for the {} particles that there are now; for others it was given before",
-            lost.join(", "),
-            self.len()
-        );
+        let (lost, n) = (lost.join(", "), self.len());
+        let what = format!("{lost} for the {n} particles that there are now (they were given for others)");
         Err(Error::OutOfOrder { call: call.into(), missing: what })
     }
 

@@ -3,6 +3,7 @@
 
 use super::Solver;
 use crate::error::{Error, Result};
+use crate::integrator::Range;
 use crate::io::Snapshot;
 use crate::model::conductivity::Law;
 use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
@@ -47,6 +48,8 @@ struct History {
     moves: bool,
     kappa_changes: bool,
     was_done_here: bool,
+    /// Between what temperatures T was set.
+    span: Option<Range>,
 }
 
 /// The axes of a snapshot, where it says which they are.
@@ -108,9 +111,9 @@ impl Solver {
         state.forget_geometry();
         state.found_h = Vec::new();
         state.last_h = last_h;
-        let History { steps, rates, moves, kappa_changes, was_done_here } = notes.history;
+        let History { steps, rates, moves, kappa_changes, was_done_here, span } = notes.history;
         (state.steps, state.rates, state.moves, state.kappa_changes) = (steps, rates, moves, kappa_changes);
-        state.was_done_here = was_done_here;
+        (state.was_done_here, state.span) = (was_done_here, span);
     }
 }
 
@@ -148,7 +151,8 @@ fn domain(domain: &Domain) -> String {
 fn history(state: &State) -> String {
     let number = |flag: bool| u8::from(flag);
     let (moves, changes, here) = (number(state.moves), number(state.kappa_changes), number(state.was_done_here));
-    format!("steps={} rates={} moves={moves} kappa_changes={changes} done_here={here}", state.steps, state.rates)
+    let span = state.span.map_or(String::new(), |span| format!(" span={:?},{:?}", span.low, span.high));
+    format!("steps={} rates={} moves={moves} kappa_changes={changes} done_here={here}{span}", state.steps, state.rates)
 }
 
 impl Notes {
@@ -240,6 +244,11 @@ fn read_history(text: &str) -> Result<History> {
         moves: count("moves", 1)? != 0,
         kappa_changes: count("kappa_changes", 1)? != 0,
         was_done_here: count("done_here", 1)? != 0,
+        span: match words.list("span")?.as_deref() {
+            None => None,
+            Some([low, high]) if low <= high => Some(Range { low: *low, high: *high }),
+            Some(_) => return Err(wrong(HISTORY, text, "span is the lowest and the highest temperature that was set")),
+        },
     };
     words.done()?;
     Ok(history)

@@ -255,7 +255,7 @@ mod tests {
         let (pool, x) = (Pool::new(1).unwrap(), [0.5, 0.1, 0.5, 0.5, 0.9]);
         let cloud = Cloud::sort(&Domain::open(1), Strided::packed(&x), 0.1, &pool).unwrap();
         assert!(cloud.shared && cloud.host == [1, 0, 2, 3, 4]);
-        let data = [3.0, 0.0, 1.0, 2.0, 0.0];
+        let data: [f64; 5] = [3.0, 0.0, 1.0, 2.0, 0.0];
         let by_data = |i: usize, j: usize| data[cloud.host[i] as usize].total_cmp(&data[cloud.host[j] as usize]);
         assert_eq!(cloud.reorder(by_data).unwrap().unwrap(), [1, 2, 3, 0, 4]);
         assert_eq!(cloud.reorder(|i, j| i.cmp(&j)).unwrap(), None);
