@@ -36,7 +36,7 @@ pub struct Facts {
     pub may_grow: bool,
     /// The operator has no negative weight.
     pub positive: bool,
-    /// The integrator promises the maximum principle, and nothing heats.
+    /// T stays where the maximum principle has it.
     pub keeps_bounds: bool,
     pub operator: &'static str,
     pub integrator: &'static str,

@@ -5,6 +5,7 @@ use super::motion::Motion;
 use super::state::{Directions, Geometry, Input, State, Weights};
 use super::{Plan, rules};
 use crate::error::{Error, Result};
+use crate::integrator::Range;
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Slot};
 use crate::model::heat::{Conductivity, Heat, Release};
@@ -398,6 +399,7 @@ impl State {
             quiet: plan.leaves_out(&rules::QUIET_ROWS),
             cancel: &self.cancel,
             slopes: Vec::new(),
+            parts: &mut self.parts,
             multigrid: Some(&mut self.multigrid),
             stiff,
             applications: 0,
@@ -414,6 +416,7 @@ impl State {
             progress: &mut self.progress,
             timers: &mut self.timers,
             known: &mut self.bounds,
+            range: Range::FINITE,
         };
         let result = work(&mut motion);
         self.applications += motion.heat.applications;

@@ -1,13 +1,14 @@
 //! Everything that a solver holds: what the host handed over, and what was derived from it, each derived thing present
 //! or absent. A setter drops what it invalidates; `prepare` makes what is missing.
 
+use super::choices::Promise;
 use super::motion::Known;
 use super::preconditioner::Preconditioning;
 use super::report::Timers;
 use super::{Choices, Facts, rules};
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::integrator::Work;
+use crate::integrator::{Range, Work};
 use crate::memory;
 use crate::model::conductivity::Law;
 use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
@@ -124,6 +125,10 @@ pub struct State {
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
     pub bounds: Option<Known>,
+    /// Between what temperatures the host has set T, until it sets something else; none before a step.
+    pub span: Option<Range>,
+    /// Which particles exchange with which; none where nobody has asked.
+    pub parts: Option<Vec<u32>>,
     /// The preconditioner of implicit steps; empty where it is not needed or was not yet.
     pub multigrid: Multigrid,
 
@@ -159,6 +164,8 @@ impl State {
             inverse_capacity: None,
             surface: None,
             bounds: None,
+            span: None,
+            parts: None,
             multigrid: Multigrid::default(),
             steps: 0,
             rates: 0,
@@ -284,7 +291,7 @@ impl State {
         if fields::TENSOR.contains(&slot) {
             self.inputs[fields::KAPPA] = Input::Unset;
         }
-        self.inputs[slot] = input;
+        (self.inputs[slot], self.span) = (input, None);
         match slot {
             fields::M | fields::RHO | fields::H => self.drop_geometry(),
             fields::KAPPA if self.directions.is_none() => self.drop_kappa(),
@@ -326,7 +333,7 @@ impl State {
 
     /// Makes the next step look at the operator anew.
     fn forget_operator(&mut self) {
-        (self.bounds, self.multigrid) = (None, Multigrid::default());
+        (self.bounds, self.parts, self.multigrid) = (None, None, Multigrid::default());
     }
 
     /// The conductivity changed.
@@ -407,7 +414,6 @@ impl State {
         // Espanol & Revenga's weights were checked, unless the host insists.
         let turned = matches!(choices.operator.tensor, Tensor::Angular(_)) && !choices.allow_unstable;
         let positive = choices.operator.positive || turned;
-        let strong_stability = choices.method.ssp > 0.0 && choices.options.keep_bounds;
         Facts {
             n: self.len(),
             dim: self.dim(),
@@ -428,7 +434,7 @@ impl State {
             may_grow: !positive && !choices.operator.dissipative && !choices.allow_unstable,
             joined: choices.operator.joins_rows(),
             positive,
-            keeps_bounds: positive && strong_stability && !heated && exchanging == 0,
+            keeps_bounds: choices.bounds == Promise::Kept && self.source_host.is_none(),
             operator: choices.operator.name,
             integrator: choices.method.name,
             auto: choices.auto.as_ref().map(|auto| auto.reason.clone()),
