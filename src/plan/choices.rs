@@ -28,7 +28,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "allow",
-        "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent without a check of its spectrum",
+        "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent and direct whatever their spectra",
     ),
     (
         "normalise",
