@@ -111,7 +111,8 @@ impl<'a> Adaptive<'a> {
     /// The next sub-step of a step of which `rest` is left, none longer than `most`: the rest in equal parts.
     pub fn next(&self, rest: f64, most: f64) -> f64 {
         let failed = self.failure.as_ref().map_or(f64::INFINITY, |f| f.0);
-        rest / (rest / self.length.min(failed).min(most)).ceil().max(1.0)
+        // A little less than the quotient: its last digits differ from one system of units to another.
+        rest / ((1.0 - 1e-9) * (rest / self.length.min(failed).min(most))).ceil().max(1.0)
     }
 
     /// Whether y changes at all: with a rate of 0 everywhere it stays as it is, however long the step.
