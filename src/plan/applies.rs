@@ -91,7 +91,14 @@ pub fn fitting(line: &str) -> String {
     while let Ok(choices) = Choices::parse_any(&line) {
         match idle(&choices) {
             None => break,
-            Some((key, ..)) => line = crate::words::replaced(&line, "", &[key]),
+            Some((key, value, _)) => {
+                // Of a list, only what has lost its effect goes.
+                let of_key = || ROWS.iter().filter(|row| row.word == key);
+                let stays = |part: &&str| of_key().all(|row| (row.applies)(&choices, part));
+                let rest = value.split(',').filter(stays).collect::<Vec<_>>().join(",");
+                let word = if rest.is_empty() { String::new() } else { format!("{key}={rest}") };
+                line = crate::words::replaced(&line, &word, &[key]);
+            }
         }
     }
     line
@@ -155,6 +162,7 @@ mod tests {
     fn a_changed_line_loses_what_it_has_no_use_for() {
         let line = "heat dim=2 integrator=sdirk2 operator=brookshaw order=4 theta=1 preconditioner=jacobi stages=3";
         assert_eq!(fitting(line), "heat dim=2 integrator=sdirk2 operator=brookshaw preconditioner=jacobi");
+        assert_eq!(fitting("heat allow=unstable,flat"), "heat allow=flat");
         assert_eq!(fitting("heat kernl=M4"), "heat kernl=M4");
     }
 }

@@ -155,10 +155,13 @@ impl Solver {
             return Ok(());
         };
         self.refuse_missing_functions(&notes)?;
-        let array = |name: &str| snapshot.field(name).map(doubles).transpose();
-        let last_h = array(restart::H_START)?.unwrap_or_default();
+        let array = |name: &str, like: usize| {
+            let values = snapshot.field(name).map(doubles).transpose()?;
+            values.map(|values| check(like, name, &Strided::packed(&values), n).map(|()| values)).transpose()
+        };
+        let last_h = array(restart::H_START, fields::H)?.unwrap_or_default();
         let u = match notes.energy {
-            Some(None) => array("u")?.ok_or_else(|| lacks("u")).map(Some)?,
+            Some(None) => array("u", fields::T)?.ok_or_else(|| lacks("u")).map(Some)?,
             _ => None,
         };
         given.extend(notes.numbers.iter().map(|(slot, v)| (*slot, Offered::Number(*v))));

@@ -73,11 +73,6 @@ impl Solver {
         self.state.dim()
     }
 
-    /// The box.
-    pub fn domain(&self) -> &space::Domain {
-        &self.state.domain
-    }
-
     /// Whether a step could be prepared: nothing is missing.
     ///
     /// # Errors
