@@ -320,10 +320,10 @@ impl State {
         self.forget_operator();
     }
 
-    /// What a step does again where `without=at_rest` asks for it: sorts, and makes all that follows, as if the same
-    /// positions had just been set.
+    /// What a step of particles that never moved does again where `without=at_rest` asks for it: sorts, and makes all that
+    /// follows, as if the same positions had just been set.
     pub fn set_anew(&mut self) -> Result<()> {
-        if self.choices.without(&rules::AT_REST) && self.steps + self.rates > 0 {
+        if self.choices.without(&rules::AT_REST) && !self.moves && self.steps + self.rates > 0 {
             self.sort_again(self.first_reach)?;
             self.last_h.clear();
             self.forget_geometry();
