@@ -4,6 +4,7 @@ use super::{Seen, trial};
 use crate::array::Strided;
 use crate::error::Result;
 use crate::integrator::Method;
+use crate::operator::table;
 use crate::solver::Solver;
 use crate::study::lattice;
 use crate::words::replaced;
@@ -69,7 +70,9 @@ impl Setting {
 
     /// Whether the words promise the maximum principle.
     pub fn keeps_bounds(&self) -> bool {
-        self.method().is_some_and(|m| m.ssp > 0.0)
+        let operator =
+            trial::value(&self.words, "operator").map_or(Ok(true), |name| table::find(name).map(|o| o.positive));
+        operator.unwrap_or(false) && !self.words.contains("bounds=free")
     }
 
     pub fn is_implicit(&self) -> bool {
