@@ -53,7 +53,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "bounds",
-        "keep: T stays between its own extremes and those of the surroundings, by sub-steps that are cut where they leave them; free: stability only (default keep where the operator is positive; with direct, consistent and two-first, which cannot, a step that leaves them by more than 5 % is refused)",
+        "keep: T stays between its own extremes and those of the surroundings, by sub-steps that are cut where they leave them; free: stability only (default keep where the operator is positive; with direct, consistent and two-first, which cannot, a step that leaves them by more than 10 % is refused)",
     ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     (
