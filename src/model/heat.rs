@@ -78,7 +78,7 @@ impl Heat<'_> {
         self.kappa_of_t(time, t)?;
         self.diffuse(t, rate)?;
         if let Some(surface) = self.surface {
-            surface.add(t, self.inverse_capacity, rate);
+            surface.add(self.evaluated_kappa(), t, self.inverse_capacity, rate);
         }
         self.release(time, t, rate)
     }
@@ -89,8 +89,9 @@ impl Heat<'_> {
     /// `NoMemory`.
     pub fn linearise_surface(&mut self, t: &[f64]) -> Result<()> {
         let Some(surface) = self.surface else { return Ok(()) };
-        self.slopes = memory::filled("slopes", t.len(), 0.0)?;
-        surface.slopes(t, |i, slope| self.slopes[i] = slope * self.inverse_capacity[i]);
+        let (mut slopes, inverse) = (memory::filled("slopes", t.len(), 0.0)?, self.inverse_capacity);
+        surface.slopes(self.evaluated_kappa(), t, |i, slope| slopes[i] = slope * inverse[i]);
+        self.slopes = slopes;
         Ok(())
     }
 
@@ -137,7 +138,8 @@ impl Heat<'_> {
         }
         let mut rate = memory::filled("supply", t.len(), 0.0)?;
         if let Some(surface) = self.surface {
-            surface.add(t, self.inverse_capacity, &mut rate);
+            self.kappa_of_t(time, t)?;
+            surface.add(self.evaluated_kappa(), t, self.inverse_capacity, &mut rate);
         }
         self.release(time, t, &mut rate)?;
         let inverse = self.inverse_capacity;
@@ -171,9 +173,18 @@ impl Heat<'_> {
             (*radius, *centre) = (*radius * scale, *centre * scale);
         }
         if let Some(surface) = self.surface {
-            surface.slopes(t, |i, slope| circles[i].1 += slope * self.inverse_capacity[i]);
+            let inverse = self.inverse_capacity;
+            surface.slopes(self.evaluated_kappa(), t, |i, slope| circles[i].1 += slope * inverse[i]);
         }
         Ok(circles)
+    }
+
+    /// kappa(T) as evaluated last; empty where it does not depend on T.
+    fn evaluated_kappa(&self) -> &[f64] {
+        match &self.conductivity {
+            Conductivity::Law(_, kappa) | Conductivity::Host(_, kappa) => kappa,
+            _ => &[],
+        }
     }
 
     /// What all pair sums are multiplied by.

@@ -2,6 +2,7 @@
 
 use super::Choices;
 use super::preconditioner::Preconditioning;
+use crate::operator::Mean;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
@@ -19,6 +20,8 @@ pub struct Facts {
     pub kappa_of_t: bool,
     /// The host has changed kappa since the weights were made.
     pub kappa_changes: bool,
+    /// Of kappa between two particles.
+    pub mean: Mean,
     /// Particles that exchange heat with the outside.
     pub exchanging: usize,
     pub heated: bool,
@@ -32,6 +35,10 @@ pub struct Facts {
     pub twice: bool,
     /// A weight depends on more than the row that it is in.
     pub joined: bool,
+    /// Weights answer to particles of fixed T.
+    pub walls: bool,
+    /// Particles beside ones that conduct much better, and those of them that pairs reach over.
+    pub bypassed: (usize, usize),
     /// Weights differ from the two sides of a pair, and modes that grow are refused.
     pub one_sided: bool,
     /// The operator has no negative weight.
@@ -61,7 +68,7 @@ impl Facts {
             choices.kernel.name(),
             choices.h_fac,
             self.operator,
-            choices.mean.name(),
+            self.mean.name(),
             self.integrator
         )
     }
