@@ -124,6 +124,19 @@ impl Surface {
         self.members.iter().all(|(_, e)| e.emissivity == 0.0)
     }
 
+    /// The bounds of what T may become that starts between these: the surroundings of what exchanges with them are in
+    /// between as well, and nothing bounds the side on which a flux is given.
+    pub fn reached(&self, mut low: f64, mut high: f64) -> (f64, f64) {
+        for (_, e) in self.members.iter().filter(|(_, e)| e.area > 0.0) {
+            if e.h_conv > 0.0 || (e.emissivity > 0.0 && self.sigma_sb > 0.0) {
+                (low, high) = (low.min(e.t_ambient), high.max(e.t_ambient));
+            }
+            low = if e.flux_in < 0.0 { f64::MIN } else { low };
+            high = if e.flux_in > 0.0 { f64::MAX } else { high };
+        }
+        (low, high)
+    }
+
     /// rate_i += power_i / capacity_i; `inverse` holds 1/capacity, `kappa` kappa(T) where it depends on T.
     pub fn add(&self, kappa: &[f64], t: &[f64], inverse: &[f64], rate: &mut [f64]) {
         for (i, exchange) in &self.members {

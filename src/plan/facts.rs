@@ -39,11 +39,11 @@ pub struct Facts {
     pub walls: bool,
     /// Particles beside ones that conduct much better, and those of them that pairs reach over.
     pub bypassed: (usize, usize),
-    /// Weights differ from the two sides of a pair, and modes that grow are refused.
-    pub one_sided: bool,
+    /// Nothing about the operator rules out modes that grow, and they are refused.
+    pub may_grow: bool,
     /// The operator has no negative weight.
     pub positive: bool,
-    /// The integrator promises the maximum principle, and nothing heats.
+    /// T stays where the maximum principle has it.
     pub keeps_bounds: bool,
     pub operator: &'static str,
     pub integrator: &'static str,

@@ -1,10 +1,11 @@
 //! The passes that make what the stages need: sort, density, weights, normalise, fold, capacity, surface, bound. Each
 //! runs only where its product is missing.
 
-use super::Plan;
 use super::motion::Motion;
 use super::state::{Directions, Geometry, Input, State, Weights};
+use super::{Plan, rules};
 use crate::error::{Error, Result};
+use crate::integrator::Range;
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Slot};
 use crate::model::heat::{Conductivity, Heat, Release};
@@ -211,7 +212,7 @@ impl State {
 
     /// Shapes of isotropic particles, where `without=isotropic` asks for them; else empty.
     fn unit_shape(&self) -> Result<Vec<Sym>> {
-        let wanted = self.choices.without("isotropic");
+        let wanted = self.choices.without(&rules::ISOTROPIC);
         memory::filled("shapes", if wanted { self.len() } else { 0 }, tensor::unit(self.dim()))
     }
 
@@ -249,7 +250,7 @@ impl State {
         }
         self.refuse_what_does_not_fit()?;
         let start = std::time::Instant::now();
-        let (mut matrix, moments) = self.with_assembly(plan.leaves_out("same_h"), |a| a.store(&self.pool))?;
+        let (mut matrix, moments) = self.with_assembly(plan.leaves_out(&rules::SAME_H), |a| a.store(&self.pool))?;
         self.timers.add("weights", start.elapsed());
         if self.choices.normalise {
             let start = std::time::Instant::now();
@@ -285,7 +286,7 @@ impl State {
     /// What an operator of two sweeps holds beside the weights of pairs.
     fn make_twice(&mut self, plan: &Plan, limited: bool) -> Result<Twice> {
         let start = std::time::Instant::now();
-        let (mass, same_h, choices) = (self.each(fields::M)?, plan.leaves_out("same_h"), &self.choices);
+        let (mass, same_h, choices) = (self.each(fields::M)?, plan.leaves_out(&rules::SAME_H), &self.choices);
         let low = match limited {
             true => Some(self.monotone_weights(same_h)?),
             false => None,
@@ -324,7 +325,7 @@ impl State {
     }
 
     fn fold_kappa(&mut self, plan: &Plan) -> Result<()> {
-        let fold = plan.leaves_out("frozen") && !plan.leaves_out("uniform_kappa");
+        let fold = plan.leaves_out(&rules::FROZEN) && !plan.leaves_out(&rules::UNIFORM_KAPPA);
         let kappa = if fold { self.each_kappa()? } else { Vec::new() };
         let (mean, pool) = (self.mean(), &self.pool);
         if let Some(weights) = self.weights.as_mut().filter(|w| fold && !w.folded) {
@@ -349,10 +350,10 @@ impl State {
     }
 
     fn prepare_surface(&mut self, plan: &Plan) -> Result<()> {
-        if plan.leaves_out("no_wall") {
+        if plan.leaves_out(&rules::NO_WALL) {
             self.surface = None;
         }
-        if plan.leaves_out("no_wall") || self.surface.is_some() {
+        if plan.leaves_out(&rules::NO_WALL) || self.surface.is_some() {
             return Ok(());
         }
         let value = |slot: Slot, i: usize| self.inputs[slot].at(i).unwrap_or(0.0);
@@ -381,7 +382,8 @@ impl State {
             emissivity: value(fields::EMISSIVITY, i),
             t_ambient: value(fields::T_AMBIENT, i),
         };
-        self.surface = Some(Surface::new(self.len(), self.sigma_sb, self.choices.without("no_wall"), kappa, exchange)?);
+        let every = self.choices.without(&rules::NO_WALL);
+        self.surface = Some(Surface::new(self.len(), self.sigma_sb, every, kappa, exchange)?);
         Ok(())
     }
 
@@ -390,7 +392,7 @@ impl State {
         let n = self.len();
         let units = self.unit_shape()?;
         let (stiff, mean) = (self.preconditioning().stiff, self.mean());
-        let uniform = plan.leaves_out("uniform_kappa");
+        let uniform = plan.leaves_out(&rules::UNIFORM_KAPPA);
         let mut evaluated = memory::filled("kappa", if self.kappa_of_t() { n } else { 0 }, 0.0)?;
         let mut released = memory::filled("source", if self.source_host.is_some() { n } else { 0 }, 0.0)?;
         let (Some(g), Some(cloud), Some(inverse_capacity)) = (&self.geometry, &self.cloud, &self.inverse_capacity)
@@ -402,7 +404,7 @@ impl State {
         let by_pair = !uniform && self.law.is_none() && self.kappa_host.is_none() && !folded;
         let kappa_given = self.directions.as_ref().map_or(&self.inputs[fields::KAPPA], |d| &d.kappa);
         let kappa = kappa_given.view(if by_pair { n } else { 0 })?;
-        let source = each(fields::SOURCE, !plan.leaves_out("no_source"))?;
+        let source = each(fields::SOURCE, !plan.leaves_out(&rules::NO_SOURCE))?;
         let conductivity = match (&mut self.kappa_host, &self.law, kappa_given) {
             (Some(host), ..) => Conductivity::Host(host, &mut evaluated),
             (None, Some(law), _) => Conductivity::Law(law, &mut evaluated),
@@ -412,7 +414,7 @@ impl State {
         };
         let release = match &mut self.source_host {
             Some(host) => Release::Host(host, &mut released),
-            None if plan.leaves_out("no_source") => Release::None,
+            None if plan.leaves_out(&rules::NO_SOURCE) => Release::None,
             None => Release::Field(&source),
         };
         let (rows, assembly);
@@ -422,7 +424,7 @@ impl State {
             None => {
                 rows = Rows::new(cloud, &g.h, self.choices.kernel.radius(), &self.pool)?;
                 let (operator, kernel, same_h) =
-                    (self.choices.operator, &self.choices.kernel, plan.leaves_out("same_h"));
+                    (self.choices.operator, &self.choices.kernel, plan.leaves_out(&rules::SAME_H));
                 let order = self.choices.order;
                 let shape = shape_of(&self.directions, &units);
                 let (volume, any_row) = (&g.volume, self.choices.allow_unstable);
@@ -440,14 +442,15 @@ impl State {
             release,
             volume: &g.volume,
             host: &cloud.host,
-            quiet: plan.leaves_out("quiet_rows"),
+            quiet: plan.leaves_out(&rules::QUIET_ROWS),
             cancel: &self.cancel,
             slopes: Vec::new(),
+            parts: &mut self.parts,
             multigrid: Some(&mut self.multigrid),
             stiff,
             applications: 0,
         };
-        if !(plan.leaves_out("keep_matrix") && heat.operator_is_fixed()) {
+        if !(plan.leaves_out(&rules::KEEP_MATRIX) && heat.operator_is_fixed()) {
             heat.multigrid.iter_mut().for_each(|m| **m = Multigrid::default());
         }
         let mut motion = Motion {
@@ -459,6 +462,7 @@ impl State {
             progress: &mut self.progress,
             timers: &mut self.timers,
             known: &mut self.bounds,
+            range: Range::FINITE,
         };
         let result = work(&mut motion);
         self.applications += motion.heat.applications;

@@ -1,13 +1,14 @@
 //! Everything that a solver holds: what the host handed over, and what was derived from it, each derived thing present
 //! or absent. A setter drops what it invalidates; `prepare` makes what is missing.
 
+use super::choices::Promise;
 use super::motion::Known;
 use super::preconditioner::Preconditioning;
 use super::report::Timers;
-use super::{Choices, Facts};
+use super::{Choices, Facts, rules};
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::integrator::Work;
+use crate::integrator::{Range, Work};
 use crate::memory;
 use crate::model::conductivity::Law;
 use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
@@ -118,12 +119,18 @@ pub struct State {
     pub geometry: Option<Geometry>,
     /// The smoothing lengths found last, in the host's order: where particles move a little, the next are near.
     pub last_h: Vec<f64>,
+    /// For which reach positions were sorted when they were set.
+    first_reach: f64,
     pub weights: Option<Weights>,
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
     pub bounds: Option<Known>,
     /// Particles beside ones that conduct much better, and those of them that pairs reach over.
     pub bypassed: Option<(usize, usize)>,
+    /// Between what temperatures the host has set T, until it sets something else; none before a step.
+    pub span: Option<Range>,
+    /// Which particles exchange with which; none where nobody has asked.
+    pub parts: Option<Vec<u32>>,
     /// The preconditioner of implicit steps; empty where it is not needed or was not yet.
     pub multigrid: Multigrid,
 
@@ -154,11 +161,14 @@ impl State {
             directions: None,
             geometry: None,
             last_h: Vec::new(),
+            first_reach: 0.0,
             weights: None,
             inverse_capacity: None,
             surface: None,
             bounds: None,
             bypassed: None,
+            span: None,
+            parts: None,
             multigrid: Multigrid::default(),
             steps: 0,
             rates: 0,
@@ -199,6 +209,7 @@ impl State {
             self.domain = old;
             return moved;
         }
+        self.first_reach = 0.0;
         self.drop_geometry();
         Ok(())
     }
@@ -211,6 +222,7 @@ impl State {
         let reach = self.reach(x);
         let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
         self.place(cloud)?;
+        self.first_reach = reach;
         self.drop_geometry();
         Ok(())
     }
@@ -282,7 +294,7 @@ impl State {
         if fields::TENSOR.contains(&slot) {
             self.inputs[fields::KAPPA] = Input::Unset;
         }
-        self.inputs[slot] = input;
+        (self.inputs[slot], self.span) = (input, None);
         match slot {
             fields::M | fields::RHO | fields::H => self.drop_geometry(),
             fields::KAPPA if self.directions.is_none() => self.drop_kappa(),
@@ -314,16 +326,26 @@ impl State {
         self.forget_geometry();
     }
 
-    /// Makes the next step build everything anew.
-    pub fn forget_geometry(&mut self) {
+    fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
         (self.surface, self.bypassed) = (None, None);
         self.forget_operator();
     }
 
+    /// What a step does again where `without=at_rest` asks for it: sorts, and makes all that follows, as if the same
+    /// positions had just been set.
+    pub fn set_anew(&mut self) -> Result<()> {
+        if self.choices.without(&rules::AT_REST) && self.steps + self.rates > 0 {
+            self.sort_again(self.first_reach)?;
+            self.last_h.clear();
+            self.forget_geometry();
+        }
+        Ok(())
+    }
+
     /// Makes the next step look at the operator anew.
     fn forget_operator(&mut self) {
-        (self.bounds, self.multigrid) = (None, Multigrid::default());
+        (self.bounds, self.parts, self.multigrid) = (None, None, Multigrid::default());
     }
 
     /// The conductivity changed.
@@ -431,7 +453,6 @@ impl State {
         // Espanol & Revenga's weights were checked, unless the host insists.
         let turned = matches!(choices.operator.tensor, Tensor::Angular(_)) && !choices.allow_unstable;
         let positive = choices.operator.positive || turned;
-        let strong_stability = choices.method.ssp > 0.0 && choices.options.keep_bounds;
         Facts {
             n: self.len(),
             dim: self.dim(),
@@ -450,12 +471,12 @@ impl State {
             normalised: choices.normalise,
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
             twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
-            one_sided: matches!(choices.operator.tensor, Tensor::Consistent) && !choices.allow_unstable,
+            may_grow: !positive && !choices.operator.dissipative && !choices.allow_unstable,
             joined: choices.operator.joins_rows(),
             walls: self.has_walls(),
             bypassed: self.bypassed.unwrap_or_default(),
             positive,
-            keeps_bounds: positive && strong_stability && !heated && exchanging == 0,
+            keeps_bounds: choices.bounds == Promise::Kept && self.source_host.is_none(),
             operator: choices.operator.name,
             integrator: choices.method.name,
             auto: choices.auto.as_ref().map(|auto| auto.reason.clone()),

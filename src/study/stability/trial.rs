@@ -84,5 +84,5 @@ pub fn positive(more: &str) -> Vec<Trial> {
 
 /// All scalar operators, of which `direct` must pass too.
 pub fn operators(more: &str) -> Vec<Trial> {
-    [positive(more), vec![Trial::pass(format!("operator=direct {more}").trim())]].concat()
+    [positive(more), vec![Trial::pass(format!("operator=direct allow=unstable {more}").trim())]].concat()
 }
