@@ -76,7 +76,9 @@ fn the_error_of_a_step_is_what_was_promised_whatever_dt_is() {
     let x = particles();
     let exact = Exact::new(&mut unit_box("", &x, 2, true));
     // auto and what it may choose answer for 1e-3 in a sub-step; change=0.05 for 5 % of the spread in one.
-    for (words, promise) in [("", 1e-3), ("integrator=sdirk2 tolerance=1e-3", 1e-3), ("integrator=rkl2", 5e-3)] {
+    for (words, promise) in
+        [("", 1e-3), ("integrator=sdirk2 tolerance=1e-3", 1e-3), ("integrator=rkl2 tolerance=off", 5e-3)]
+    {
         for (name, start) in starts(&x) {
             for limits in LIMITS {
                 let (error, outside) = one_step(words, &x, &exact, &start, limits);
@@ -87,9 +89,10 @@ fn the_error_of_a_step_is_what_was_promised_whatever_dt_is() {
         }
     }
     // What the default was before: one long sub-step, in no bounds. These criteria see it.
-    let old = "integrator=rkl2 change=inf bounds=free";
-    let (error, outside) = one_step(old, &x, &exact, &starts(&x)[0].1, 2.0);
-    assert!(error > 0.05 && outside > 0.01, "{error:e} {outside:e}");
+    let old = "integrator=rkl2 tolerance=off change=inf bounds=free";
+    let (disc, spike) = (&starts(&x)[0].1, &starts(&x)[2].1);
+    let (error, outside) = (one_step(old, &x, &exact, disc, 2.0).0, one_step(old, &x, &exact, spike, 2.0).1);
+    assert!(error > 0.05 && outside > 1e3, "{error:e} {outside:e}");
 }
 
 #[test]
@@ -209,9 +212,11 @@ fn a_source_that_depends_on_t_is_followed() {
         for method in METHODS {
             let (low, high) = follow(&format!("integrator={} tolerance=1e-4", method.name), rate).unwrap();
             assert!((low - exact).abs() < 0.02 && (high - exact).abs() < 0.02, "{} {rate}: {low} {high}", method.name);
-            // Without one, a single implicit step is what it is: nothing blows up.
-            let (low, high) = follow(&format!("integrator={}", method.name), rate).unwrap();
-            assert!((low - exact).abs() < 0.3 && (high - exact).abs() < 0.3, "{} {rate}: {low} {high}", method.name);
+            // Without one, a single implicit step is what it is (Crank-Nicolson's turns what is stiff round): nothing
+            // blows up.
+            let (low, high) = follow(&format!("integrator={} tolerance=off", method.name), rate).unwrap();
+            let most = if method.name == "crank-nicolson" { 1.01 } else { 0.3 };
+            assert!((low - exact).abs() < most && (high - exact).abs() < most, "{} {rate}: {low} {high}", method.name);
         }
         let (low, high) = follow("", rate).unwrap();
         assert!((low - exact).abs() < 2e-3 && (high - exact).abs() < 2e-3, "{rate}: {low} {high}");
@@ -245,7 +250,10 @@ fn a_value_that_is_not_finite_in_any_call_of_the_source_is_never_done() {
         done.unwrap();
         for bad in (0..calls).step_by(calls / 20 + 1) {
             let error = step(bad).0.unwrap_err().to_string();
-            assert!(error.contains("source[") && error.contains("NaN"), "{words} call {bad} of {calls}: {error}");
+            assert!(
+                error.contains("source callback") && error.contains("NaN at particle"),
+                "{words} call {bad} of {calls}: {error}"
+            );
         }
     }
 }

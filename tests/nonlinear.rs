@@ -164,7 +164,7 @@ fn an_exponential_conductivity_is_solved_or_refused() {
                     };
                     solved += 1;
                     assert!((report.energy / report.energy_before - 1.0).abs() < 1e-12, "{case}");
-                    if method == "backward-euler" {
+                    if method == "backward-euler" && report.substeps == 1 {
                         // It is the solution: T - dt rate(T) is what there was before, to tolerance and rounding.
                         let rate = s.get_all("dT_dt").unwrap();
                         let residual = (0..t.len()).map(|i| (t[i] - dt * rate[i] - start[i]).abs()).fold(0.0, f64::max);

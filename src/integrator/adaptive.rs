@@ -111,17 +111,13 @@ impl<'a> Adaptive<'a> {
     /// The next sub-step of a step of which `rest` is left, none longer than `most`: the rest in equal parts.
     pub fn next(&self, rest: f64, most: f64) -> f64 {
         let failed = self.failure.as_ref().map_or(f64::INFINITY, |f| f.0);
-        rest / (rest / self.length.min(failed).min(most)).ceil().max(1.0)
+        // A little less than the quotient: its last digits differ from one system of units to another.
+        rest / ((1.0 - 1e-9) * (rest / self.length.min(failed).min(most))).ceil().max(1.0)
     }
 
     /// Whether y changes at all: with a rate of 0 everywhere it stays as it is, however long the step.
     pub fn is_still(&self) -> bool {
         sum::max(self.pool, self.rate.len(), |i| self.rate[i].abs()) <= 0.0
-    }
-
-    /// The rate at the beginning.
-    pub fn rate(&self) -> &[f64] {
-        &self.rate
     }
 
     /// How far y has come from its beginning, root mean square.
@@ -151,7 +147,7 @@ impl<'a> Adaptive<'a> {
         let dt = schedule.dt;
         let error = match self.estimate(method, schedule, system, t, y, work).and_then(|error| self.kept(error, system))
         {
-            Err(error) if shorter_may_do(&error) => {
+            Err(error) if self.shorter_may_do(&error, system) => {
                 self.failure = Some((RETREAT * dt, error));
                 f64::INFINITY
             }
@@ -181,14 +177,20 @@ impl<'a> Adaptive<'a> {
             return Ok(error);
         };
         let value = self.trial[index];
-        if !value.is_finite() {
-            return Err(Error::NotFinite { what: "T".into(), index, value });
-        }
         if system.confine(range, CONFINED, &mut self.trial)? {
             return Ok(error);
         }
         let promise = format!("{} keeps in short sub-steps", self.control.method.name);
         Err(Error::OutOfBounds { index, value, low: range.low, high: range.high, promise })
+    }
+
+    /// Whether an error may be one of the sub-step's length: equations unsolved, bounds left, or a kappa asked for at a
+    /// stage that overshoots.
+    fn shorter_may_do(&self, error: &Error, system: &dyn System) -> bool {
+        match error {
+            Error::NotConverged { .. } => self.control.tolerance.is_some() || !system.is_linear(),
+            other => matches!(other, Error::BadElement { .. } | Error::OutOfBounds { .. }),
+        }
     }
 
     /// By what the length of a sub-step changes after this error.
@@ -265,13 +267,4 @@ impl Method {
             _ => None,
         }
     }
-}
-
-/// Whether an error may be one of the sub-step's length: equations unsolved, bounds left, or a kappa asked for at a stage
-/// that overshoots.
-fn shorter_may_do(error: &Error) -> bool {
-    matches!(
-        error,
-        Error::NotConverged { .. } | Error::NotFinite { .. } | Error::BadElement { .. } | Error::OutOfBounds { .. }
-    )
 }

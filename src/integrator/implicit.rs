@@ -118,7 +118,7 @@ fn solve(
     for _ in 0..CORRECTIONS {
         match system.rate(t, y, residual) {
             // Where a correction went too far, the rate may not be defined.
-            Err(Error::BadElement { .. } | Error::NotFinite { .. }) if taken.halve(pool, y, correction) => continue,
+            Err(Error::BadElement { .. }) if taken.halve(pool, y, correction) => continue,
             done => done?,
         }
         pool.update(residual, |start, part| {

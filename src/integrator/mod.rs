@@ -29,6 +29,11 @@ pub trait System {
         Ok(Linear::Unknown)
     }
 
+    /// Whether the rate is linear in y: a stage whose equations are not solved in one length is not in a little less.
+    fn is_linear(&self) -> bool {
+        false
+    }
+
     /// Writes A x to `ax`, with A as `linearise` fixed it.
     fn apply(&mut self, _x: &[f64], ax: &mut [f64]) -> Result<()> {
         ax.fill(0.0);

@@ -109,7 +109,7 @@ impl Heat<'_> {
     /// more when hotter, and empty where no function heats. A value is taken to depend on the T of its own particle.
     ///
     /// # Errors
-    /// `CallbackFailed`; `BadValue` naming a particle whose source is not finite; `NoMemory`.
+    /// `CallbackFailed`; `NotFinite` naming a particle whose source is not; `NoMemory`.
     pub fn cooling(&mut self, time: f64, t: &[f64]) -> Result<Vec<f64>> {
         let Release::Host(host, buffer) = &mut self.release else { return Ok(Vec::new()) };
         let largest = sum::max(self.pool, t.len(), |i| t[i].abs());
@@ -195,14 +195,25 @@ impl Heat<'_> {
         if self.surface.is_none() && matches!(self.release, Release::None) {
             return Ok(Some(0.0));
         }
+        let (rate, inverse) = (self.from_outside(time, t)?, self.inverse_capacity);
+        Ok(Some(sum::sum(self.pool, t.len(), |i| capacity(inverse[i]) * rate[i])))
+    }
+
+    /// The part of dT/dt that sources and surroundings make; empty where there are none.
+    ///
+    /// # Errors
+    /// As [`Heat::rate`].
+    pub fn from_outside(&mut self, time: f64, t: &[f64]) -> Result<Vec<f64>> {
+        if self.surface.is_none() && matches!(self.release, Release::None) {
+            return Ok(Vec::new());
+        }
         let mut rate = memory::filled("supply", t.len(), 0.0)?;
         if let Some(surface) = self.surface {
             self.kappa_of_t(time, t)?;
             surface.add(self.evaluated_kappa(), t, self.inverse_capacity, &mut rate);
         }
         self.release(time, t, &mut rate)?;
-        let inverse = self.inverse_capacity;
-        Ok(Some(sum::sum(self.pool, t.len(), |i| capacity(inverse[i]) * rate[i])))
+        Ok(rate)
     }
 
     /// The diffusive part of dT/dt alone, with the conductivity evaluated last.
@@ -320,9 +331,9 @@ fn source_of(
     match sum::first(pool, t.len(), |i| !source[i].is_finite()) {
         None => Ok(()),
         Some(i) => {
-            // Not an error of an element: a shorter sub-step would ask again, and hide it.
-            let value = format!("{} (at T = {})", source[i], t[i]);
-            Err(Error::bad(&format!("source[{}]", particles[i]), value, "the callback must give finite values"))
+            // Not an error that a shorter sub-step may mend: asked again, it could hide.
+            let what = format!("the source callback's value at T = {}", t[i]);
+            Err(Error::NotFinite { what, index: particles[i] as usize, value: source[i] })
         }
     }
 }

@@ -28,7 +28,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "allow",
-        "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent without a check of its spectrum",
+        "unstable: run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent and direct whatever their spectra",
     ),
     (
         "normalise",
@@ -45,7 +45,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     (
         "change",
-        "most that T may change in a sub-step of rkl1 and rkl2, relative to its spread; inf for no such limit (default 0.05)",
+        "most that T may change in a sub-step of rkl1 and rkl2 with tolerance=off, relative to its spread; inf for no such limit (default 0.05)",
     ),
     (
         "max_stages",
@@ -58,7 +58,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     (
         "tolerance",
-        "most error in time of a sub-step, root mean square, relative to the spread of T; off: dt or stability decides (default off; of auto 1e-3). Errors of sub-steps add up: after a decay methods of order 2 and more err by 0.1 to 3 times this much, euler, rkl1 and backward-euler by up to 300 times",
+        "most error in time of a sub-step, root mean square, relative to the spread of T; off: dt, stability or change= decides (default off; of auto, rkl1 and rkl2 1e-3). Errors of sub-steps add up: after a decay methods of order 2 and more err by 0.1 to 3 times this much, euler, rkl1 and backward-euler by up to 300 times",
     ),
     (
         "solver_tolerance",
@@ -175,7 +175,9 @@ impl Choices {
         };
         let (mut options, bounds) = options(&mut words, operator, allow_unstable)?;
         let change = words.number("change", "change must be positive", |v| v > 0.0)?.unwrap_or(CHANGE);
-        let tolerance = tolerance(&mut words, auto.as_ref().map(|_| auto::TOLERANCE))?;
+        // Those that take sub-steps of any length look at their errors unless told otherwise.
+        let by_error = auto.is_some() || (method.is_stabilised() && options.stages.is_none());
+        let tolerance = tolerance(&mut words, by_error.then_some(auto::TOLERANCE))?;
         if tolerance.is_some() && !line.contains("max_stages=") {
             options.max_stages = CONTROLLED_STAGES;
         }

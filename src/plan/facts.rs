@@ -49,6 +49,8 @@ pub struct Facts {
     pub integrator: &'static str,
     /// What was chosen, and why, where the choice is ours.
     pub auto: Option<String>,
+    /// Errors of sub-steps are estimated.
+    pub controlled: bool,
     /// The integrator solves for its stages.
     pub implicit: bool,
     /// How the equations of its stages are preconditioned.

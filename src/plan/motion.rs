@@ -66,6 +66,10 @@ impl System for Heat<'_> {
         Ok(if self.is_linear() { Linear::Exact } else { Linear::Frozen })
     }
 
+    fn is_linear(&self) -> bool {
+        Heat::is_linear(self)
+    }
+
     fn apply(&mut self, x: &[f64], ax: &mut [f64]) -> Result<()> {
         self.linear(x, ax)
     }
@@ -172,7 +176,7 @@ impl Motion<'_> {
         }
         // Nothing makes a step possible that is too long for stability alone: it is refused before any work.
         method.schedule(dt, bounds, options)?;
-        let reference = self.norm(|i| t[i]).max(dt * self.mean(pace.rate()).abs());
+        let reference = self.norm(|i| t[i]).max(dt * self.heat_from_outside(time, t)?);
         let mut done = 0.0;
         while done < dt {
             let (now, rest) = (time + done, dt - done);
@@ -223,8 +227,9 @@ impl Motion<'_> {
         Err(match pace.failure() {
             Some(failure) => self.of_host(failure.clone()),
             None => {
-                let (needed, remedy) = (applications as f64 * dt / (dt - rest), self.remedy().into());
-                Error::StepTooLarge { dt, needed, allowed, remedy }
+                // As many again for what is left, or one for each sub-step where nothing is done yet.
+                let needed = (applications as f64 * dt / (dt - rest)).min(applications as f64 + rest / part);
+                Error::StepTooLarge { dt, needed, allowed, remedy: self.remedy().into() }
             }
         })
     }
@@ -240,11 +245,11 @@ impl Motion<'_> {
     /// An error of the integrator, which knows particles by their internal number.
     fn of_host(&self, error: Error) -> Error {
         match error {
+            Error::OutOfBounds { index, value, .. } if !value.is_finite() => {
+                Error::NotFinite { what: "T".into(), index: self.heat.host[index] as usize, value }
+            }
             Error::OutOfBounds { index, value, low, high, promise } => {
                 Error::OutOfBounds { index: self.heat.host[index] as usize, value, low, high, promise }
-            }
-            Error::NotFinite { what, index, value } => {
-                Error::NotFinite { what, index: self.heat.host[index] as usize, value }
             }
             other => other,
         }
@@ -271,11 +276,10 @@ impl Motion<'_> {
         Ok(if most > 0.0 { most } else { f64::INFINITY })
     }
 
-    /// The mean of a quantity over the volume.
-    fn mean(&self, values: &[f64]) -> f64 {
-        let volume = self.heat.volume;
-        let total = sum::sum(self.pool, volume.len(), |i| volume[i]);
-        sum::sum(self.pool, volume.len(), |i| volume[i] / total * values[i])
+    /// How fast T rises by all that is no exchange between particles, root mean square.
+    fn heat_from_outside(&mut self, time: f64, t: &[f64]) -> Result<f64> {
+        let rate = self.heat.from_outside(time, t)?;
+        Ok(sum::rms(self.pool, rate.len(), |i| self.heat.volume[i], |i| rate[i]))
     }
 
     /// The spread of a quantity over the volume.
@@ -286,8 +290,7 @@ impl Motion<'_> {
 
     fn schedule(&self, dt: f64, bounds: Bounds) -> Result<(&'static Method, Schedule)> {
         let (method, options) = (self.choices.method, &self.choices.options);
-        let alone = options.stages.is_none() && self.choices.tolerance.is_none();
-        if self.plan.leaves_out(&rules::ONE_STAGE) && alone && dt <= explicit_limit(bounds) {
+        if self.plan.leaves_out(&rules::ONE_STAGE) && options.stages.is_none() && dt <= explicit_limit(bounds) {
             let euler = integrator::find("euler")?;
             return Ok((euler, euler.schedule(dt, bounds, options)?));
         }

@@ -94,7 +94,7 @@ table! {
         name: "one_stage",
         reason: "an rkl1 step below the explicit limit is one Euler stage, of the same order",
         same: Same::Order,
-        holds: |f| f.integrator == "rkl1",
+        holds: |f| f.integrator == "rkl1" && !f.controlled,
     };
     PROVEN_BOUND = Rule {
         name: "proven_bound",

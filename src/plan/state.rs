@@ -480,6 +480,7 @@ impl State {
             operator: choices.operator.name,
             integrator: choices.method.name,
             auto: choices.auto.as_ref().map(|auto| auto.reason.clone()),
+            controlled: choices.tolerance.is_some(),
             implicit: choices.method.is_implicit(),
             preconditioning: self.preconditioning(),
             buffers: self.work.bytes() as f64 / 8.0 / self.len().max(1) as f64,
