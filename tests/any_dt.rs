@@ -56,20 +56,22 @@ fn spread(t: &[f64]) -> f64 {
     (t.iter().map(|t| (t - mean) * (t - mean)).sum::<f64>() / t.len() as f64).sqrt()
 }
 
-/// The error of one step, relative to the spread at the beginning, and how far T is outside its bounds.
-fn one_step(words: &str, x: &[f64], exact: &Exact, start: &[f64], limits: f64) -> (f64, f64) {
+/// The error of one step, relative to the spread at the beginning, how far T is outside its bounds, and applications of
+/// the operator.
+fn one_step(words: &str, x: &[f64], exact: &Exact, start: &[f64], limits: f64) -> (f64, f64, u64) {
     let mut s = unit_box(words, x, 2, true);
     set(&mut s, "T", start);
     let dt = limits * s.limit().unwrap();
-    s.step(dt).unwrap_or_else(|e| panic!("{words} {limits}: {e}"));
+    let report = s.step(dt).unwrap_or_else(|e| panic!("{words} {limits}: {e}"));
     let t = s.get_all("T").unwrap();
     let off: Vec<f64> = t.iter().zip(exact.after(start, dt)).map(|(a, b)| a - b).collect();
     let error = (off.iter().map(|v| v * v).sum::<f64>() / off.len() as f64).sqrt() / spread(start);
     let (low, high) = start.iter().fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
-    (error, t.iter().map(|t| (low - t).max(t - high)).fold(f64::MIN, f64::max))
+    let outside = t.iter().map(|t| (low - t).max(t - high)).fold(f64::MIN, f64::max);
+    (error, outside, report.applications)
 }
 
-const LIMITS: [f64; 9] = [0.1, 0.5, 1.0, 2.0, 3.0, 8.0, 30.0, 200.0, 1000.0];
+const LIMITS: [f64; 10] = [0.1, 0.5, 1.0, 2.0, 3.0, 10.0, 30.0, 100.0, 1000.0, 1e4];
 
 #[test]
 fn the_error_of_a_step_is_what_was_promised_whatever_dt_is() {
@@ -81,8 +83,8 @@ fn the_error_of_a_step_is_what_was_promised_whatever_dt_is() {
     {
         for (name, start) in starts(&x) {
             for limits in LIMITS {
-                let (error, outside) = one_step(words, &x, &exact, &start, limits);
-                println!("{words:35} {name:17} {limits:6}: {error:.1e} {outside:e}");
+                let (error, outside, applications) = one_step(words, &x, &exact, &start, limits);
+                println!("{words:35} {name:17} {limits:6}: {error:.1e} with {applications}");
                 assert!(error < promise, "{words} {name} {limits}: {error:e}");
                 assert!(outside <= 0.0, "{words} {name} {limits}: outside by {outside:e}");
             }
@@ -140,7 +142,7 @@ fn bounds_that_cannot_be_kept_are_refused_and_those_left_by_far_are_an_error() {
     let error = error.unwrap_err();
     assert!(error.name() == "OUT_OF_BOUNDS" && error.to_string().contains("two-first misses"), "{error}");
     assert_eq!(bits(&t), bits(&start));
-    assert!(step("bounds=free").0.unwrap().t_min < 1.0 - 0.05e6);
+    assert!(step("bounds=free").0.unwrap().t_min < 1.0 - 0.1e6);
 }
 
 #[test]
@@ -209,7 +211,8 @@ fn a_source_that_depends_on_t_is_followed() {
     };
     for rate in [1.0f64, 10.0, 1e3, 1e6] {
         let exact = 2.0 - (-rate).exp();
-        for method in METHODS {
+        // A million sub-steps of an explicit method teach nothing new.
+        for method in METHODS.iter().filter(|m| rate < 1e6 || m.is_implicit()) {
             let (low, high) = follow(&format!("integrator={} tolerance=1e-4", method.name), rate).unwrap();
             assert!((low - exact).abs() < 0.02 && (high - exact).abs() < 0.02, "{} {rate}: {low} {high}", method.name);
             // Without one, a single implicit step is what it is (Crank-Nicolson's turns what is stiff round): nothing

@@ -86,7 +86,7 @@ impl Heat<'_> {
         self.kappa_of_t(time, t)?;
         self.diffuse(t, rate)?;
         if let Some(surface) = self.surface {
-            surface.add(t, self.inverse_capacity, rate);
+            surface.add(self.evaluated_kappa(), t, self.inverse_capacity, rate);
         }
         self.release(time, t, rate)
     }
@@ -98,8 +98,10 @@ impl Heat<'_> {
     pub fn linearise_losses(&mut self, time: f64, t: &[f64]) -> Result<()> {
         self.slopes = self.cooling(time, t)?;
         let Some(surface) = self.surface else { return Ok(()) };
-        memory::extended("slopes", &mut self.slopes, t.len(), 0.0)?;
-        surface.slopes(t, |i, slope| self.slopes[i] += slope * self.inverse_capacity[i]);
+        let (mut slopes, inverse) = (std::mem::take(&mut self.slopes), self.inverse_capacity);
+        memory::extended("slopes", &mut slopes, t.len(), 0.0)?;
+        surface.slopes(self.evaluated_kappa(), t, |i, slope| slopes[i] += slope * inverse[i]);
+        self.slopes = slopes;
         Ok(())
     }
 
@@ -207,7 +209,8 @@ impl Heat<'_> {
         }
         let mut rate = memory::filled("supply", t.len(), 0.0)?;
         if let Some(surface) = self.surface {
-            surface.add(t, self.inverse_capacity, &mut rate);
+            self.kappa_of_t(time, t)?;
+            surface.add(self.evaluated_kappa(), t, self.inverse_capacity, &mut rate);
         }
         self.release(time, t, &mut rate)?;
         Ok(rate)
@@ -240,9 +243,18 @@ impl Heat<'_> {
             (*radius, *centre) = (*radius * scale, *centre * scale);
         }
         if let Some(surface) = self.surface {
-            surface.slopes(t, |i, slope| circles[i].1 += slope * self.inverse_capacity[i]);
+            let inverse = self.inverse_capacity;
+            surface.slopes(self.evaluated_kappa(), t, |i, slope| circles[i].1 += slope * inverse[i]);
         }
         Ok(circles)
+    }
+
+    /// kappa(T) as evaluated last; empty where it does not depend on T.
+    fn evaluated_kappa(&self) -> &[f64] {
+        match &self.conductivity {
+            Conductivity::Law(_, kappa) | Conductivity::Host(_, kappa) => kappa,
+            _ => &[],
+        }
     }
 
     /// What all pair sums are multiplied by.

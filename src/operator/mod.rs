@@ -15,6 +15,7 @@
 
 pub mod aggregate;
 pub mod arnoldi;
+pub mod bypass;
 pub mod consistent;
 pub mod gradient;
 mod ldl;
@@ -31,6 +32,7 @@ mod stencils;
 pub mod table;
 pub mod tensor;
 pub mod twice;
+pub mod walls;
 
 pub use matrix::Matrix;
 pub use mean::Mean;

@@ -108,7 +108,11 @@ impl Assembly<'_> {
         }
         let mut matrix = Matrix::new(n, blocks);
         match self.operator.tensor {
-            Tensor::Stencils => matrix.symmetrise(pool)?,
+            Tensor::Stencils => {
+                matrix.symmetrise(pool)?;
+                matrix.normalise(pool, &moments::second(self, &matrix, pool)?)?;
+                projected::project(self, &mut matrix, pool)?;
+            }
             Tensor::Projected => {
                 matrix.normalise(pool, &moments)?;
                 projected::project(self, &mut matrix, pool)?;

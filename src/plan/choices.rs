@@ -37,7 +37,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "mean",
-        "of kappa between two particles: harmonic, arithmetic or geometric; fronts of kappa(T) into the cold need arithmetic, for the others are 0 where one kappa is (default harmonic; consistent: arithmetic)",
+        "of kappa between two particles: harmonic, which jumps of kappa need, arithmetic, which fronts of kappa(T) into the cold need, for the others are 0 where one kappa is, or geometric (default harmonic; kappa(T) and consistent: arithmetic)",
     ),
     (
         "integrator",
@@ -54,7 +54,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "bounds",
-        "keep: T stays between its own extremes and those of the surroundings, by sub-steps that are cut where they leave them; free: stability only (default keep where the operator is positive; with direct, consistent and two-first, which cannot, a step that leaves them by more than 5 % is refused)",
+        "keep: T stays between its own extremes and those of the surroundings, by sub-steps that are cut where they leave them; free: stability only (default keep where the operator is positive; with direct, consistent and two-first, which cannot, a step that leaves them by more than 10 % is refused)",
     ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     (
@@ -114,7 +114,8 @@ pub struct Choices {
     pub allow_unstable: bool,
     /// Particles may leave an axis empty.
     pub allow_flat: bool,
-    pub mean: Mean,
+    /// As the host said.
+    mean: Option<Mean>,
     pub method: &'static Method,
     /// The method is chosen anew for each step.
     pub auto: Option<Auto>,
@@ -151,15 +152,18 @@ impl Choices {
         let positive = |v: f64| v > 0.0 && v.is_finite();
         let h_fac = words.number("h_fac", "h_fac must be positive", positive)?.unwrap_or(kernel.h_fac());
         let operator = table::find(words.take("operator").unwrap_or("brookshaw"))?;
-        let projected = matches!(operator.tensor, Tensor::Projected);
+        let projected = matches!(operator.tensor, Tensor::Projected | Tensor::Stencils);
         let normalise = match words.take("normalise") {
             None => operator.normalise,
             // Projected weights start from pair-normalised ones; doing it once more would spoil them.
             Some(word) => choice("normalise", word, &[("pair", true), ("none", false)])? && !projected,
         };
-        let consistent = matches!(operator.tensor, Tensor::Consistent);
-        // Σ w (k_a + k_b)/2 (T_b − T_a) = ½ (∇²(k T) + k ∇²T − T ∇²k) = ∇·(k ∇T): only this mean keeps the order.
-        let mean = Mean::find(words.take("mean").unwrap_or(if consistent { "arithmetic" } else { "harmonic" }))?;
+        let mean = words.take("mean").map(Mean::find).transpose()?;
+        if mean == Some(Mean::Geometric) && matches!(operator.tensor, Tensor::Twice { .. }) {
+            let rule =
+                format!("operator={} knows harmonic and arithmetic means: two gradients have no other", operator.name);
+            return Err(Error::bad("mean", "geometric", &rule));
+        }
         let order = match words.take("order") {
             None => 4,
             Some(word) => choice("order", word, &[("2", 2), ("4", 4), ("6", 6)])?,
@@ -224,6 +228,14 @@ impl Choices {
             memory,
             without,
         })
+    }
+
+    /// The mean of kappa between two particles: as the host said, or what suits the operator and kappa.
+    pub fn mean(&self, kappa_of_t: bool) -> Mean {
+        // Σ w (k_a + k_b)/2 (T_b − T_a) = ½ (∇²(k T) + k ∇²T − T ∇²k) = ∇·(k ∇T): only this mean keeps the order. And only
+        // it lets a front of kappa(T) run into what does not conduct yet.
+        let arithmetic = kappa_of_t || matches!(self.operator.tensor, Tensor::Consistent);
+        self.mean.unwrap_or(if arithmetic { Mean::Arithmetic } else { Mean::Harmonic })
     }
 
     /// Whether a rule is switched off.
@@ -310,6 +322,7 @@ mod tests {
             ("heat dim=2 wall", "'wall'"),
             ("heat operator=direct integrator=sdirk2", "needs a linear operator that cannot grow: brookshaw"),
             ("heat operator=two-first theta=-1", "theta must be"),
+            ("heat operator=limited mean=geometric", "harmonic and arithmetic"),
             ("heat solver_tolerance=0", "between 0 and 1"),
             ("heat tolerance=1", "between 0 and 1, or off"),
         ] {

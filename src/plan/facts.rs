@@ -2,6 +2,7 @@
 
 use super::Choices;
 use super::preconditioner::Preconditioning;
+use crate::operator::Mean;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
@@ -19,6 +20,8 @@ pub struct Facts {
     pub kappa_of_t: bool,
     /// The host has changed kappa since the weights were made.
     pub kappa_changes: bool,
+    /// Of kappa between two particles.
+    pub mean: Mean,
     /// Particles that exchange heat with the outside.
     pub exchanging: usize,
     pub heated: bool,
@@ -32,6 +35,10 @@ pub struct Facts {
     pub twice: bool,
     /// A weight depends on more than the row that it is in.
     pub joined: bool,
+    /// Weights answer to particles of fixed T.
+    pub walls: bool,
+    /// Particles beside ones that conduct much better, and those of them that pairs reach over.
+    pub bypassed: (usize, usize),
     /// Nothing about the operator rules out modes that grow, and they are refused.
     pub may_grow: bool,
     /// The operator has no negative weight.
@@ -63,7 +70,7 @@ impl Facts {
             choices.kernel.name(),
             choices.h_fac,
             self.operator,
-            choices.mean.name(),
+            self.mean.name(),
             self.integrator
         )
     }

@@ -51,14 +51,21 @@ pub struct Plan {
     pub left_out: Vec<&'static Rule>,
     /// Rules that would hold, switched off by `without=`.
     pub disabled: Vec<&'static Rule>,
+    /// What a host should know before it believes the answer.
+    pub notes: Vec<String>,
 }
+
+/// Of the particles beside ones that conduct much better: the share that pairs may reach over without a word. Corners of
+/// thick bodies are less.
+const BYPASSED: f64 = 0.1;
 
 impl Plan {
     /// Compiles the plan of a scene.
     pub fn new(choices: &Choices, facts: &Facts) -> Plan {
         let (disabled, left_out): (Vec<_>, Vec<_>) =
             RULES.iter().copied().filter(|r| (r.holds)(facts)).partition(|r| choices.without(r));
-        let mut plan = Plan { title: facts.title(choices), passes: Vec::new(), left_out, disabled };
+        let mut plan =
+            Plan { title: facts.title(choices), passes: Vec::new(), left_out, disabled, notes: notes(facts) };
         plan.passes = plan.list(choices, facts);
         plan
     }
@@ -96,7 +103,7 @@ impl Plan {
             add("normalise", setup, 8.0 * n, pairs, "pairs scaled by the mean of 1/K_a and 1/K_b".into());
         }
         if self.leaves_out(&rules::FROZEN) && !self.leaves_out(&rules::UNIFORM_KAPPA) {
-            add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", choices.mean.name()));
+            add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", facts.mean.name()));
         }
         if self.leaves_out(&rules::RATE_ONLY) {
             add("rate", When::EachStep, 0.0, pairs, "du/dt for a host that integrates itself".into());
@@ -172,8 +179,21 @@ impl fmt::Display for Plan {
             Ok(())
         };
         section("left out", &self.left_out)?;
-        section("could be left out, but without= says no", &self.disabled)
+        section("could be left out, but without= says no", &self.disabled)?;
+        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }
+}
+
+fn notes(facts: &Facts) -> Vec<String> {
+    let (beside, over) = facts.bypassed;
+    let thin = over as f64 > BYPASSED * beside as f64;
+    let layers = || {
+        format!(
+            "{over} particles lie in layers so thin that pairs of particles which conduct ten times better reach over \
+             them: too much heat passes; such a layer must be thicker than a support (more particles, or a smaller h_fac)"
+        )
+    };
+    thin.then(layers).into_iter().collect()
 }
 
 /// 1234567 as `1.2 M`.

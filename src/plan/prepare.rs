@@ -13,7 +13,8 @@ use crate::model::surface::{Exchange, Surface};
 use crate::model::tensor::Tensor;
 use crate::operator::table::{self, OPERATORS, Tensor as Form};
 use crate::operator::twice::Recipe;
-use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, tensor};
+use crate::operator::walls::Walls;
+use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, bypass, tensor};
 use crate::space::{density, rows::Rows};
 use std::borrow::Cow;
 
@@ -32,6 +33,7 @@ impl State {
         self.refuse_lost("plan", 0..INPUTS)?;
         self.prepare_geometry("plan")?;
         self.prepare_directions("plan")?;
+        self.look_for_thin_layers()?;
         Ok(Plan::new(&self.choices, &self.facts()))
     }
 
@@ -119,12 +121,12 @@ impl State {
         if self.inputs[fields::H] == Input::Unset && self.inputs[fields::RHO] == Input::Unset {
             let h = self.find_lengths(call)?;
             self.inputs[fields::H] = Input::Each(h);
-            let made = self.make_geometry(call);
+            let made = self.make_geometry(call, true);
             self.inputs[fields::H] = Input::Unset;
             self.geometry = Some(made?);
             self.timers.add("density", start.elapsed());
         } else {
-            self.geometry = Some(self.make_geometry(call)?);
+            self.geometry = Some(self.make_geometry(call, false)?);
             self.timers.add("sort", start.elapsed());
         }
         Ok(())
@@ -149,7 +151,8 @@ impl State {
         Ok(h)
     }
 
-    fn make_geometry(&mut self, call: &str) -> Result<Geometry> {
+    /// `found`: h was found together with rho, and tells it.
+    fn make_geometry(&mut self, call: &str, found: bool) -> Result<Geometry> {
         let (nu, radius) = (self.dim() as f64, self.choices.kernel.radius());
         let mut h = self.lengths(nu)?;
         let reach = radius * h.iter().copied().fold(0.0, f64::max);
@@ -162,6 +165,10 @@ impl State {
         let cloud = self.cloud(call)?;
         let rows = Rows::new(cloud, &h, radius, &self.pool)?;
         let rho = match &self.inputs[fields::RHO] {
+            Input::Unset if found => {
+                let rho = |(m, h): (&f64, &f64)| m * (self.choices.h_fac / h).powf(nu);
+                memory::collected("rho", m.iter().zip(&h).map(rho))?
+            }
             Input::Unset => density::sum(&self.choices.kernel, &rows, &m, &self.pool)?,
             _ => self.each(fields::RHO)?,
         };
@@ -263,6 +270,20 @@ impl State {
         self.with_motion(&plan, |motion| memory::copied("kappa", motion.heat.kappa_of_t(time, &t)?))
     }
 
+    /// Counts the particles that pairs of better conductors reach over.
+    fn look_for_thin_layers(&mut self) -> Result<()> {
+        if self.bypassed.is_some() {
+            return Ok(());
+        }
+        self.bypassed = Some(match self.kappa() {
+            Input::Each(kappa) if !self.kappa_of_t() => {
+                self.with_rows(|rows| bypass::count(rows, |i| kappa[i], &self.pool))?
+            }
+            _ => (0, 0),
+        });
+        Ok(())
+    }
+
     fn prepare_weights(&mut self, plan: &Plan) -> Result<()> {
         if self.weights.is_some() {
             return Ok(());
@@ -273,9 +294,12 @@ impl State {
         self.timers.add("weights", start.elapsed());
         if self.choices.normalise {
             let start = std::time::Instant::now();
-            matrix.normalise(&self.pool, &moments)?;
+            let mut completed = memory::copied("second moments", &moments)?;
+            self.at_walls(|walls| walls.complete_moments(&matrix, &mut completed))?;
+            matrix.normalise(&self.pool, &completed)?;
             self.timers.add("normalise", start.elapsed());
         }
+        self.at_walls(|walls| walls.complete(&mut matrix))?;
         if let (Some(i), Some(cloud)) = (matrix.first_bad(&self.pool), &self.cloud) {
             let what = "a pair weight".to_string();
             return Err(Error::NotFinite { what, index: cloud.host[i] as usize, value: f64::NAN });
@@ -286,6 +310,17 @@ impl State {
         };
         self.weights = Some(Weights { matrix, twice, moments, folded: false });
         Ok(())
+    }
+
+    /// Calls `work` where some particles are walls.
+    fn at_walls(&self, work: impl FnOnce(&Walls<&(dyn Fn(usize) -> bool + Sync + Send)>) -> Result<()>) -> Result<()> {
+        if !self.has_walls() {
+            return Ok(());
+        }
+        let (fixed, pool) = (&self.inputs[fields::FIXED], &self.pool);
+        let fixed = |i: usize| fixed.at(i).is_some_and(|f| f != 0.0);
+        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
+        self.with_rows(|rows| work(&Walls { rows, volume, fixed: &fixed, pool }))
     }
 
     /// What an operator of two sweeps holds beside the weights of pairs.
@@ -307,9 +342,7 @@ impl State {
     fn monotone_weights(&self, same_h: bool) -> Result<Matrix> {
         let operator = table::find("monotone")?;
         let fitted = |a: &Assembly| Assembly { operator, ..*a }.store(&self.pool);
-        let (mut matrix, moments) = self.with_assembly(same_h, fitted)?;
-        matrix.normalise(&self.pool, &moments)?;
-        Ok(matrix)
+        Ok(self.with_assembly(same_h, fitted)?.0)
     }
 
     /// 1/(Omega rho)
@@ -334,7 +367,7 @@ impl State {
     fn fold_kappa(&mut self, plan: &Plan) -> Result<()> {
         let fold = plan.leaves_out(&rules::FROZEN) && !plan.leaves_out(&rules::UNIFORM_KAPPA);
         let kappa = if fold { self.each_kappa()? } else { Vec::new() };
-        let (pool, mean) = (&self.pool, self.choices.mean);
+        let (mean, pool) = (self.mean(), &self.pool);
         if let Some(weights) = self.weights.as_mut().filter(|w| fold && !w.folded) {
             let kappa = &kappa[..];
             self.timers.time("fold", || weights.matrix.scale(pool, move |a, b| mean.of(kappa[a], kappa[b])));
@@ -370,14 +403,27 @@ impl State {
                 return Err(Error::bad_at(FIELDS[slot].name, self.host(i), value(slot, i), rule));
             }
         }
+        let flows = |i: usize| {
+            [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY].into_iter().any(|slot| value(slot, i) != 0.0)
+        };
+        let areas = self.areas(flows)?;
+        if let Some(i) = (0..self.len()).find(|&i| flows(i))
+            && areas.iter().all(|&area| area == 0.0)
+        {
+            let rule = "no particle that exchanges heat with the outside faces it: exchange at a surface, or give area";
+            return Err(Error::bad_at("area", self.host(i), 0.0, rule));
+        }
+        let kappa = |i: usize| self.kappa().at(i).unwrap_or(0.0);
         let exchange = |i: usize| Exchange {
-            area: self.area(i),
+            area: areas[i],
+            depth: self.depth(i),
             flux_in: value(fields::FLUX_IN, i),
             h_conv: value(fields::H_CONV, i),
             emissivity: value(fields::EMISSIVITY, i),
             t_ambient: value(fields::T_AMBIENT, i),
         };
-        self.surface = Some(Surface::new(self.len(), self.sigma_sb, self.choices.without(&rules::NO_WALL), exchange)?);
+        let every = self.choices.without(&rules::NO_WALL);
+        self.surface = Some(Surface::new(self.len(), self.sigma_sb, every, kappa, exchange)?);
         Ok(())
     }
 
@@ -385,7 +431,7 @@ impl State {
     pub fn with_motion<T>(&mut self, plan: &Plan, work: impl FnOnce(&mut Motion) -> Result<T>) -> Result<T> {
         let n = self.len();
         let units = self.unit_shape()?;
-        let stiff = self.preconditioning().stiff;
+        let (stiff, mean) = (self.preconditioning().stiff, self.mean());
         let uniform = plan.leaves_out(&rules::UNIFORM_KAPPA);
         let mut evaluated = memory::filled("kappa", if self.kappa_of_t() { n } else { 0 }, 0.0)?;
         let mut released = memory::filled("source", if self.source_host.is_some() { n } else { 0 }, 0.0)?;
@@ -429,7 +475,7 @@ impl State {
         let mut heat = Heat {
             pool: &self.pool,
             pairs,
-            mean: self.choices.mean,
+            mean,
             inverse_capacity,
             conductivity,
             surface: self.surface.as_ref(),

@@ -118,7 +118,7 @@ table! {
         name: "used_once",
         reason: "weights that serve one rate of moving particles are applied as they are made, and not stored",
         same: Same::Bits,
-        holds: |f| f.rate_only && f.moves && !f.normalised && !f.twice && !f.joined,
+        holds: |f| f.rate_only && f.moves && !f.normalised && !f.twice && !f.joined && !f.walls,
     };
     DECAYS = Rule {
         name: "decays",

@@ -16,9 +16,9 @@ use crate::model::fields::{self, INPUTS, Slot};
 use crate::model::heat::Callback;
 use crate::model::surface::Surface;
 use crate::operator::table::Tensor;
-use crate::operator::{Matrix, Multigrid, Sym, Twice};
+use crate::operator::{Matrix, Mean, Multigrid, Sym, Twice};
 use crate::pool::Pool;
-use crate::space::{Cloud, Domain};
+use crate::space::{Cloud, Domain, facing};
 use crate::sum;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -84,6 +84,8 @@ pub struct State {
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
     pub bounds: Option<Known>,
+    /// Particles beside ones that conduct much better, and those of them that pairs reach over.
+    pub bypassed: Option<(usize, usize)>,
     /// Between what temperatures the host has set T, until it sets something else; none before a step.
     pub span: Option<Range>,
     /// Which particles exchange with which; none where nobody has asked.
@@ -126,6 +128,7 @@ impl State {
             inverse_capacity: None,
             surface: None,
             bounds: None,
+            bypassed: None,
             span: None,
             parts: None,
             multigrid: Multigrid::default(),
@@ -198,9 +201,18 @@ impl State {
             slot if slot == fields::KAPPA || fields::TENSOR.contains(&slot) => self.drop_directions(),
             fields::C_V | fields::FIXED => {
                 self.inverse_capacity = None;
+                if slot == fields::FIXED {
+                    // Exchanges with walls are in the weights.
+                    self.weights = None;
+                }
                 self.forget_operator();
             }
-            fields::FLUX_IN | fields::H_CONV | fields::EMISSIVITY | fields::T_AMBIENT | fields::AREA => {
+            fields::FLUX_IN
+            | fields::H_CONV
+            | fields::EMISSIVITY
+            | fields::T_AMBIENT
+            | fields::AREA
+            | fields::DEPTH => {
                 self.surface = None;
                 self.forget_operator();
             }
@@ -221,14 +233,14 @@ impl State {
     /// Makes what follows from positions, masses, densities and smoothing lengths missing.
     pub fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
-        self.surface = None;
+        (self.surface, self.bypassed) = (None, None);
         self.forget_operator();
     }
 
-    /// What a step does again where `without=at_rest` asks for it: sorts, and makes all that follows, as if the same
-    /// positions had just been set.
+    /// What a step of particles that never moved does again where `without=at_rest` asks for it: sorts, and makes all that
+    /// follows, as if the same positions had just been set.
     pub fn set_anew(&mut self) -> Result<()> {
-        if self.choices.without(&rules::AT_REST) && self.steps + self.rates > 0 {
+        if self.choices.without(&rules::AT_REST) && !self.moves && self.steps + self.rates > 0 {
             let reach = self.reach(&self.domain, self.len(), |axis| self.extent(axis));
             self.sort_again(reach)?;
             self.forget_geometry();
@@ -244,6 +256,7 @@ impl State {
     /// The conductivity changed.
     pub fn drop_kappa(&mut self) {
         self.kappa_changes |= self.steps + self.rates > 0;
+        (self.surface, self.bypassed) = (None, None);
         self.forget_operator();
         if self.weights.as_ref().is_some_and(|w| w.folded) {
             self.weights = None;
@@ -278,16 +291,42 @@ impl State {
         self.forget_operator();
     }
 
-    /// The area of a particle that faces outside: as given, or one face of a cube of its volume. Needs the geometry.
-    pub fn area(&self, i: usize) -> f64 {
-        let nu = self.dim() as f64;
-        let face = || self.geometry.as_ref().map_or(0.0, |g| g.volume[i].powf((nu - 1.0) / nu));
-        self.inputs[fields::AREA].at(i).unwrap_or_else(face)
+    /// The area of each particle that faces outside: as given, or what its neighbours leave open; the latter only where
+    /// it is wanted. Needs the geometry.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn areas(&self, wanted: impl Fn(usize) -> bool + Sync + Send) -> Result<Vec<f64>> {
+        if self.inputs[fields::AREA] != Input::Unset {
+            return self.each(fields::AREA);
+        }
+        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
+        self.with_rows(|rows| facing::areas(&self.choices.kernel, rows, volume, wanted, &self.pool))
+    }
+
+    /// How deep a particle's centre lies below its area: as given, or half a spacing. Needs the geometry.
+    pub fn depth(&self, i: usize) -> f64 {
+        let half = || self.geometry.as_ref().map_or(0.0, |g| 0.5 * g.volume[i].powf(1.0 / self.dim() as f64));
+        self.inputs[fields::DEPTH].at(i).unwrap_or_else(half)
+    }
+
+    /// Whether some particles have a fixed T, to which the weights of their neighbours answer.
+    pub fn has_walls(&self) -> bool {
+        let fixed = match &self.inputs[fields::FIXED] {
+            Input::Each(v) => v.iter().any(|&f| f != 0.0),
+            other => !matches!(other, Input::Number(0.0) | Input::Unset),
+        };
+        fixed && self.choices.operator.completes_walls()
     }
 
     /// kappa depends on T.
     pub fn kappa_of_t(&self) -> bool {
         self.law.is_some() || self.kappa_host.is_some()
+    }
+
+    /// Of kappa between two particles.
+    pub fn mean(&self) -> Mean {
+        self.choices.mean(self.kappa_of_t())
     }
 
     /// Whether some particle exchanges heat with the outside.
@@ -330,6 +369,7 @@ impl State {
             uniform_kappa: !self.kappa_of_t() && matches!(self.kappa(), Input::Number(_)),
             kappa_of_t: self.kappa_of_t(),
             kappa_changes: self.kappa_changes,
+            mean: self.mean(),
             exchanging,
             heated,
             rate_only: self.rates > 0 && self.steps == 0,
@@ -338,6 +378,8 @@ impl State {
             twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
             may_grow: !positive && !choices.operator.dissipative && !choices.allow_unstable,
             joined: choices.operator.joins_rows(),
+            walls: self.has_walls(),
+            bypassed: self.bypassed.unwrap_or_default(),
             positive,
             keeps_bounds: choices.bounds == Promise::Kept && self.source_host.is_none(),
             operator: choices.operator.name,

@@ -296,7 +296,8 @@ fn open_side(setting: &Setting, seen: &mut Seen) -> Result<()> {
     seen.remember(&s.get_all("T")?);
     seen.at_most("energy off by", (energy(&mut s)?.0 - before).abs() / size, 1e-12);
     set(&mut s, "h_conv", &field(&x, 2, |p| if p[0] < 1.0 / 16.0 { 0.3 } else { 0.0 }))?;
-    s.set_number("T_ambient", 1.0)?;
+    // T is that of the surface.
+    numbers(&mut s, &[("T_ambient", 1.0), ("depth", 0.0)])?;
     let [m, rate, area, h_conv, t] = ["m", "rate", "area", "h_conv", "T"].map(|name| s.get_all(name));
     let (m, rate, area, h_conv, t) = (m?, rate?, area?, h_conv?, t?);
     let gained: f64 = m.iter().zip(&rate).map(|(m, r)| m * r).sum();

@@ -71,9 +71,9 @@ impl Setting {
 
     /// Whether the words promise the maximum principle.
     pub fn keeps_bounds(&self) -> bool {
-        let operator =
-            trial::value(&self.words, "operator").map_or(Ok(true), |name| table::find(name).map(|o| o.positive));
-        operator.unwrap_or(false) && !self.words.contains("bounds=free")
+        let named = trial::value(&self.words, "operator").unwrap_or("brookshaw");
+        let able = table::find(named).is_ok_and(|o| o.positive) && !self.words.contains("bounds=free");
+        able || self.method().is_some_and(|m| m.ssp > 0.0)
     }
 
     pub fn is_implicit(&self) -> bool {

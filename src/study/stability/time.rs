@@ -181,11 +181,12 @@ fn disc_after(setting: &Setting, limits: f64, seen: &mut Seen) -> Result<Solver>
         let mean = known.get_number("energy")? / capacity;
         known.set_number("T", mean)?;
     }
-    seen.at_most(
-        "given off, wrong by",
-        (given_off(&mut s)? / given_off(&mut known)? - 1.0).abs(),
-        blur(setting, limits),
-    );
+    let share = given_off(&mut s)? / given_off(&mut known)?;
+    match setting.words.contains("crank-nicolson") {
+        // Its long steps overshoot: what has left may be twice too much.
+        true => seen.at_least("given off", share, 0.3),
+        false => seen.at_most("given off, wrong by", (share - 1.0).abs(), blur(setting, limits)),
+    }
     Ok(s)
 }
 
@@ -202,12 +203,14 @@ fn given_off(s: &mut Solver) -> Result<f64> {
 fn blur(setting: &Setting, limits: f64) -> f64 {
     let first = setting.method().is_some_and(|m| m.order == 1);
     match (setting.is_implicit(), first) {
-        (true, _) if setting.words.contains("crank-nicolson") => 1.1,
         _ if limits > 100.0 => 2e-2,
         (true, true) => 0.4,
         (true, false) => 0.15,
         (false, true) => 0.2,
-        (false, false) => 0.05,
+        // All that is given off is nearly as much with any kappa in the end.
+        (false, false) if limits > 10.0 => 0.02,
+        (false, false) if limits > 1.0 => 0.05,
+        (false, false) => 0.08,
     }
 }
 
