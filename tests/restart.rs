@@ -270,7 +270,12 @@ fn particles_that_do_not_fill_their_space_are_refused_unless_the_host_insists() 
     assert!(s.get_all("h").is_err() && s.get_all("T").is_ok());
     // Where images fill the axis, it is full.
     s.set_box(&[0.0; 2], &[1.0, 0.05], &[false, true]).unwrap();
+    s.set_number("h", 0.07).unwrap();
     s.step(1e-4).unwrap();
+    // Where they are out of reach, it is not.
+    s.set_number("h", 0.01).unwrap();
+    assert!(s.step(1e-4).unwrap_err().to_string().contains("flat along y"));
+    s.set_number("h", 0.07).unwrap();
     // Thin is not flat.
     let thin: Vec<f64> = row.chunks(2).enumerate().flat_map(|(i, p)| [p[0], p[1] + 1e-6 * (i as f64).sin()]).collect();
     s.set_box(&[0.0; 2], &[1.0; 2], &[false; 2]).unwrap();
