@@ -2,6 +2,7 @@
 
 use super::Choices;
 use super::preconditioner::Preconditioning;
+use crate::operator::Normalise;
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
@@ -32,6 +33,8 @@ pub struct Facts {
     pub twice: bool,
     /// A weight depends on more than the row that it is in.
     pub joined: bool,
+    /// How wrong projected weights conduct, once they are made.
+    pub defect: Option<f64>,
     /// Weights differ from the two sides of a pair, and modes that grow are refused.
     pub one_sided: bool,
     /// The operator has no negative weight.
@@ -52,7 +55,10 @@ pub struct Facts {
 
 impl Facts {
     pub fn title(&self, choices: &Choices) -> String {
-        let normalised = if choices.normalise { "pair-normalised" } else { "not normalised" };
+        let normalised = match choices.normalise {
+            Normalise::No => "not normalised".to_string(),
+            by => format!("{}-normalised", by.name()),
+        };
         format!(
             "heat: {} particles in {}-D, {:.0} neighbours; {} (h_fac {}), {} {normalised}, {} kappa, {}",
             self.n,
