@@ -11,15 +11,15 @@ pub type Result<T> = std::result::Result<T, Error>;
 pub enum Error {
     // Recoverable: the state is as it was.
     #[error(
-        "step of {dt:e} needs {needed} applications of the operator, more than max_applications={allowed}; take a smaller dt, raise max_applications, or choose integrator=rkl2"
+        "step of {dt:e} needs some {needed:.1e} applications of the operator, more than max_applications={allowed}; take a smaller dt, raise max_applications, or {remedy}"
     )]
-    StepTooLarge { dt: f64, needed: u64, allowed: u64 },
+    StepTooLarge { dt: f64, needed: f64, allowed: u64, remedy: String },
     #[error(
         "{what} became {value} at particle {index}; nothing was changed: take a smaller dt or check the source and kappa there"
     )]
     NotFinite { what: String, index: usize, value: f64 },
     #[error(
-        "T of particle {index} left the bounds: {value:e} is outside [{low:e}, {high:e}], which {promise} keeps; nothing was changed: take a smaller dt"
+        "T of particle {index} left its bounds: {value:e} is outside [{low:e}, {high:e}], which {promise}; nothing was changed: take a smaller dt, an operator that is positive (brookshaw, kernel, projected; limited or monotone for tensors), or say bounds=free"
     )]
     OutOfBounds { index: usize, value: f64, low: f64, high: f64, promise: String },
     #[error(

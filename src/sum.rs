@@ -75,7 +75,8 @@ fn deviation(
 ) -> f64 {
     let largest = max(pool, n, |i| value(i).abs());
     if !largest.is_finite() || largest == 0.0 {
-        return largest.max(0.0);
+        // Not max(0): that would drop a NaN. Nothing at all deviates by nothing.
+        return if largest < 0.0 { 0.0 } else { largest };
     }
     let total = sum(pool, n, &weight);
     let scaled = |i: usize| value(i) / largest;
@@ -124,6 +125,8 @@ mod tests {
         assert!((rms / 1e200 - 3f64.sqrt()).abs() < 1e-15);
         assert_eq!(spread(&pool, 2, |_| 1.0, |i| [0.0, f64::INFINITY][i]), f64::INFINITY);
         assert_eq!(spread(&pool, 2, |_| 1.0, |_| 0.0), 0.0);
+        assert_eq!(spread(&pool, 0, |_| 1.0, |_| 0.0), 0.0);
+        assert!(spread(&pool, 2, |_| 1.0, |i| [f64::NAN, 1.0][i]).is_nan());
     }
 
     #[test]

@@ -174,7 +174,7 @@ const TABLE: &[Row] = &[
     Row("diffusph_step", as_is, |h| unsafe { diffusph_step(h.s, 1e-3, (&raw mut h.report).byte_add(ODD)) }, -2, "multiple of 8"),
     Row("diffusph_step", empty, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, -4, "set_particles first"),
     Row("diffusph_step", little_work, |h| unsafe { diffusph_step(h.s, 1e3, &mut h.report) }, 1, "max_applications=3"),
-    Row("diffusph_step", source_nan, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, 2, "T became NaN at particle"),
+    Row("diffusph_step", source_nan, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, 2, "NaN at particle 0"),
     Row("diffusph_step", stopping, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, 5, "cancelled"),
     Row("diffusph_step", kappa_42, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, 7, "kappa callback returned 42"),
     Row("diffusph_step", kappa_nan, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, -2, "is NaN (at T = "),

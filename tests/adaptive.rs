@@ -58,7 +58,13 @@ fn errors_follow_the_tolerance() {
 fn no_tolerance_is_no_control() {
     for method in names("integrators") {
         let (off, report) = run(&format!("integrator={method} tolerance=off"));
-        assert_eq!((bits(&off), report.rejected), (bits(&run(&format!("integrator={method}")).0), 0));
+        assert_eq!(report.rejected, 0);
+        // Stabilised methods look at their errors unless told not to.
+        let default = if method.starts_with("rkl") { " tolerance=1e-3" } else { "" };
+        let same = |words: &str| {
+            bits(&run(&format!("integrator={method}{words}")).0) == bits(&run(&format!("integrator={method}")).0)
+        };
+        assert!(same(default) && (default.is_empty() == (bits(&off) == bits(&run(&format!("integrator={method}")).0))));
     }
 }
 
@@ -132,7 +138,7 @@ fn auto_chooses_by_stiffness_and_the_plan_says_so() {
         let plan = s.plan().unwrap().to_string();
         assert!(plan.contains(&format!("auto: {} because dt is", report.integrator)), "{plan}");
         // The next step is another step.
-        assert_eq!(s.step(0.5 * limit).unwrap().integrator, if words == "bounds=keep" { "ssprk3" } else { "rkl2" });
+        assert_eq!(s.step(0.5 * limit).unwrap().integrator, "rkl2");
         (report.integrator, s.get_all("T").unwrap())
     };
     for (words, stiffness, expected) in [
@@ -140,8 +146,8 @@ fn auto_chooses_by_stiffness_and_the_plan_says_so() {
         ("", 1e6, "sdirk2"),
         ("tolerance=off", 300.0, "rkl2"),
         ("tolerance=off", 1e4, "sdirk2"),
-        ("bounds=keep", 40.0, "ssprk3"),
-        ("bounds=keep", 1e3, "backward-euler"),
+        ("bounds=keep", 40.0, "rkl2"),
+        ("bounds=keep", 1e6, "sdirk2"),
     ] {
         let (integrator, t) = after(words, stiffness);
         assert_eq!(integrator, expected, "{words} {stiffness}");

@@ -115,7 +115,7 @@ fn one_giant_step_reaches_the_steady_parabola() {
 fn the_outside_is_part_of_the_equations() {
     let lone = |words: &str, name: &str, value: f64| {
         let mut s = unit_box(&format!("kernel=M4 {words}"), &[0.0], 1, false);
-        for (name, value) in [("h", 0.1), ("c_v", 2.0), ("m", 3.0), ("area", 0.7), (name, value)] {
+        for (name, value) in [("h", 0.1), ("c_v", 2.0), ("m", 3.0), ("area", 0.7), ("depth", 0.0), (name, value)] {
             s.set_number(name, value).unwrap();
         }
         s

@@ -96,6 +96,26 @@ fn means_that_vanish_with_one_kappa_freeze_a_front() {
     }
 }
 
+#[test]
+fn a_front_moves_whatever_makes_kappa_depend_on_t_unless_the_host_says_harmonic() {
+    let exact = wave(2.5, 1).front(TIMES.1);
+    let (radius, h) = travel("integrator=backward-euler", 2.5, 1, 60);
+    assert!((radius - exact).abs() < 2.0 * h, "{radius} {exact}");
+
+    let (mut s, _) = front("", 2.5, 1);
+    let title = |s: &mut Solver| s.plan().unwrap().title;
+    assert!(title(&mut s).contains("arithmetic kappa"));
+    s.set_kappa_callback(Some(Box::new(|_, _, t, kappa| {
+        kappa.iter_mut().zip(t).for_each(|(k, t)| *k = t.max(0.0).powf(2.5));
+        0
+    })));
+    assert!(title(&mut s).contains("arithmetic kappa"));
+    s.set_number("kappa", 1.0).unwrap();
+    assert!(title(&mut s).contains("harmonic kappa"));
+    let (mut s, _) = front("mean=harmonic", 2.5, 1);
+    assert!(title(&mut s).contains("harmonic kappa"));
+}
+
 /// kappa = exp(T) with T from 0 to `hot`, in one step of `stiffness` explicit limits.
 fn exponential(
     words: &str,
@@ -144,7 +164,7 @@ fn an_exponential_conductivity_is_solved_or_refused() {
                     };
                     solved += 1;
                     assert!((report.energy / report.energy_before - 1.0).abs() < 1e-12, "{case}");
-                    if method == "backward-euler" {
+                    if method == "backward-euler" && report.substeps == 1 {
                         // It is the solution: T - dt rate(T) is what there was before, to tolerance and rounding.
                         let rate = s.get_all("dT_dt").unwrap();
                         let residual = (0..t.len()).map(|i| (t[i] - dt * rate[i] - start[i]).abs()).fold(0.0, f64::max);

@@ -120,7 +120,8 @@ fn an_open_cloud_keeps_its_insulation() {
             let exact: Vec<f64> = mode.iter().map(|m| m * (-1.0f64).exp()).collect();
             l2(&s.get_all("T").unwrap(), &exact)
         };
-        let (ours, theirs) = (after("projected"), after("brookshaw"));
+        // Pairs that are normalised by direction are better still in the cube, whose particles are all near a face.
+        let (ours, theirs) = (after("projected"), after("brookshaw normalise=pair"));
         println!("open, {dim}-D: {theirs:.2e} -> {ours:.2e}");
         assert!(ours < theirs, "{dim}-D: {ours:e} {theirs:e}");
     }

@@ -18,6 +18,29 @@ fn nothing_fails_that_should_pass_and_what_should_fail_does() {
     assert!(failing.clone().count() > 5 && failing.clone().all(|r| !r.reason.is_empty() && !r.seen.is_empty()));
 }
 
+/// Rows that pass with solvers that conduct `conducts` times as much as they are asked to.
+fn blind(numbers: &[u32], conducts: f64) -> (Vec<Row>, usize) {
+    let cases: Vec<_> = stability::cases().into_iter().filter(|case| numbers.contains(&case.number)).collect();
+    let (rows, _) = stability::control(&cases, 1, conducts, Box::new(|_| true)).unwrap();
+    let tried = rows.iter().filter(|r| matches!(r.verdict, Verdict::Pass | Verdict::Fail)).count();
+    (rows.into_iter().filter(|r| r.verdict == Verdict::Pass).collect(), tried)
+}
+
+#[test]
+fn a_solver_that_does_nothing_fails_where_something_must_move() {
+    let (passing, tried) = blind(&[1, 2, 3, 4, 5, 14, 28, 30, 31, 32, 33, 41, 43, 44, 54], 0.0);
+    assert!(passing.is_empty() && tried > 60, "of {tried}: {passing:#?}");
+}
+
+#[test]
+fn a_solver_that_is_wrong_by_a_fifth_fails_where_a_rate_is_known() {
+    // Of the first three, methods that take one long step, or are of first order, are wrong by as much.
+    let coarse = ["euler", "rkl1", "crank-nicolson", "sdirk2"];
+    let first = |row: &&Row| row.case > 3 || !coarse.iter().any(|m| row.words.contains(m));
+    let passing: Vec<&Row> = passing.iter().filter(first).collect();
+    assert!(passing.is_empty() && tried > 40, "of {tried}: {passing:#?}");
+}
+
 #[test]
 fn there_are_62_cases_each_with_a_number_of_its_own() {
     let numbers: Vec<u32> = stability::cases().iter().map(|case| case.number).collect();

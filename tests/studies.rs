@@ -6,7 +6,8 @@ use std::collections::HashMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-const STUDIES: &[&str] = &["convergence", "kernels", "positivity", "sod", "work-precision", "peers", "claims"];
+const STUDIES: &[&str] =
+    &["convergence", "kernels", "positivity", "sod", "work-precision", "peers", "claims", "accuracy"];
 
 fn program(name: &str, out: &Path, more: &[&str]) -> Command {
     let mut command = Command::new(env!("CARGO_BIN_EXE_diffusph"));
@@ -76,7 +77,7 @@ fn every_study_leaves_a_page_that_fetches_nothing_and_tables_that_can_be_read() 
             assert_eq!(rows.len(), known["rows"].as_array().unwrap().len());
             assert!(!rows.is_empty(), "{name} {}", known["name"]);
         }
-        assert_eq!(html.contains("<svg"), *name != "claims", "{name}");
+        assert_eq!(html.contains("<svg"), !["claims", "accuracy"].contains(name), "{name}");
     }
 }
 
@@ -104,6 +105,19 @@ fn moments_and_sweet_spots_are_the_known_ones() {
     let spots = table(out.path(), "kernels-sweet_spots.csv");
     let m6 = row(&spots, &[("particles", "square"), ("kernel", "M6"), ("operator", "brookshaw")]);
     assert!((number(m6, "sweet h_fac") - 0.9).abs() < 1e-9 && number(m6, "neighbours") < 21.0, "{m6:?}");
+}
+
+#[test]
+fn kernels_are_compared_at_equal_supports() {
+    let out = tempfile::tempdir().unwrap();
+    let said = study("sod", out.path(), &[]);
+    let compared = said.matches("M6 at 0.90 has").count();
+    assert!(compared >= 2 && said.matches("M4 at 1.35 has").count() == compared, "{said}");
+    let rows = table(out.path(), "sod-errors.csv");
+    for (kernel, h_fac) in [("M4", 1.35), ("M6", 0.9)] {
+        let own = rows.iter().filter(|r| r["kernel"] == kernel && (number(r, "h_fac") - h_fac).abs() < 1e-12);
+        assert!(own.count() >= 2, "{kernel} at {h_fac}");
+    }
 }
 
 #[test]

@@ -3,6 +3,7 @@
 mod particles;
 
 use diffusph::Solver;
+use diffusph::study::exact::space::Contact;
 use particles::*;
 use std::f64::consts::PI;
 
@@ -76,6 +77,18 @@ fn every_tensor_operator_is_conservative_and_the_linear_ones_are_symmetric() {
         let mut s = unit_box(&format!("kernel=M4 allow=unstable operator={operator}"), &x, 2, true);
         set(&mut s, "h", &field(&x, 2, |p| (1.2 + 0.3 * (9.0 * p[0]).sin()) / 24.0));
         turning(&mut s, &x);
+        // A layer that does not conduct, and one that conducts well.
+        let contrast = |p: &[f64]| {
+            if p[0] < 0.3 {
+                1.0
+            } else if p[0] < 0.6 {
+                0.0
+            } else {
+                300.0
+            }
+        };
+        set(&mut s, "kappa_par", &field(&x, 2, |p| contrast(p) * (2.0 + p[0])));
+        set(&mut s, "kappa_perp", &field(&x, 2, |p| contrast(p) * (1.5 - p[1])));
         let mut rate = |t: &[f64]| {
             set(&mut s, "T", t);
             s.get_all("dT_dt").unwrap()
@@ -358,4 +371,55 @@ fn a_tensor_that_depends_on_temperature_keeps_its_shape() {
     s.step(1e-3).unwrap();
     let change = l2(&s.get_all("T").unwrap(), &layers);
     assert!(change < 1e-3, "{change}");
+}
+
+#[test]
+fn two_gradients_see_the_faces_between_materials() {
+    // Bodies in contact at x = 0, with ends so far away that they do not matter.
+    let n = 200;
+    let mut random = Random(3);
+    let x: Vec<f64> = (0..n).map(|i| (2.0 * (f64::from(i) + 0.5 + 0.1 * random.next())) / f64::from(n) - 1.0).collect();
+    for ratio in [10.0, 100.0] {
+        let contact = Contact { at: 0.0, temperature: [1.0, 2.0], kappa: [1.0, ratio], capacity: [1.0, ratio] };
+        let side = |values: [f64; 2]| field(&x, 1, |p| values[usize::from(p[0] >= 0.0)]);
+        let exact = field(&x, 1, |p| contact.at([p[0], 0.0, 0.0], 0.01));
+        let error = |words: &str| {
+            let mut s = unit_box(&format!("kernel=M4 {words}"), &x, 1, false);
+            s.set_number("m", 2.0 / f64::from(n)).unwrap();
+            for (name, values) in [("kappa", contact.kappa), ("c_v", contact.capacity), ("T", contact.temperature)] {
+                set(&mut s, name, &side(values));
+            }
+            s.step(0.01).unwrap();
+            let t = s.get_all("T").unwrap();
+            let change: f64 = exact.iter().zip(side(contact.temperature)).map(|(e, t)| (e - t).powi(2)).sum();
+            (t.iter().zip(&exact).map(|(t, e)| (t - e).powi(2)).sum::<f64>() / change).sqrt()
+        };
+        let means = error("operator=two-first mean=arithmetic");
+        for words in ["operator=two-first", "operator=two-first gradient=plain", "operator=limited"] {
+            let faces = error(words);
+            println!("{words} 1:{ratio}: {faces:.4}, fluxes averaged {means:.4}");
+            // As without a jump: steps of T on a hundred particles a side.
+            assert!(faces < 0.01 && means > 3.0 * faces, "{words} 1:{ratio}: {faces} {means}");
+        }
+    }
+}
+
+#[test]
+fn nothing_passes_a_layer_that_does_not_conduct() {
+    let x = lattice(20, 2, 0.2);
+    let side = |p: &[f64]| f64::from(p[0] > 0.65) - f64::from(p[0] < 0.35);
+    for words in ["operator=two-first", "operator=two-first gradient=plain theta=0", "operator=limited"] {
+        let mut s = unit_box(words, &x, 2, false);
+        set(&mut s, "kappa", &field(&x, 2, |p| side(p).abs()));
+        let start = field(&x, 2, |p| 2.0 + side(p) + p[1]);
+        set(&mut s, "T", &start);
+        s.step(0.1).unwrap();
+        let t = s.get_all("T").unwrap();
+        for (which, moves) in [(-1.0, true), (0.0, false), (1.0, true)] {
+            let part: Vec<usize> = (0..400).filter(|&i| side(&x[2 * i..2 * i + 2]) == which).collect();
+            let sum = |t: &[f64]| part.iter().map(|&i| t[i]).sum::<f64>();
+            assert!((sum(&t) / sum(&start) - 1.0).abs() < 1e-12, "{words} {which}");
+            assert_eq!(part.iter().any(|&i| t[i] != start[i]), moves, "{words} {which}");
+        }
+    }
 }

@@ -1,5 +1,5 @@
-//! Sub-steps as long as a tolerance allows, for every method: an estimate of each sub-step's error, and a controller
-//! that takes it or does it again shorter.
+//! Sub-steps as long as they may be, for every method: an estimate of each sub-step's error where there is a tolerance,
+//! bounds on y where there is a maximum principle, and a controller that takes a sub-step or does it again shorter.
 //!
 //! Explicit and stabilised methods of order 1 and 2 are held against the trapezoidal rule, for one rate more: the
 //! estimate of Sommeijer, Shampine & Verwer (J. Comput. Appl. Math. 88, 315, 1998), 0.8 (y_0 − y_1) + 0.4 dt (f_0 +
@@ -7,7 +7,7 @@
 //! kept (Hairer, Nørsett & Wanner, Solving ODEs I, II.4): implicit methods damp what is too stiff to be resolved, and
 //! such an estimate does too.
 
-use super::{Family, Method, Schedule, System, Work};
+use super::{Family, Method, Range, Schedule, System, Work};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::Pool;
@@ -23,8 +23,14 @@ const RANGE: (f64, f64) = (0.1, 5.0);
 /// than one without memory where stiffness sets the pace (Gustafsson 1991; Hairer & Wanner, Solving ODEs II, IV.2).
 const PROPORTIONAL: (f64, f64) = (0.7, 0.4);
 
-/// By how much a sub-step is shortened that failed without an estimate.
+/// By how much a sub-step is shortened that failed without an estimate, and by how much those after it may be longer than
+/// the one before.
 const RETREAT: f64 = 0.25;
+const RECOVERY: f64 = 1.5;
+
+/// The largest share of what is inside the bounds that may be moved to bring in what is outside: a tenth of an error that
+/// counts as none.
+const CONFINED: f64 = 1e-4;
 
 /// Differences of so many roundings of y are no error of the method.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
@@ -34,11 +40,13 @@ const ROUNDING: f64 = 8.0 * f64::EPSILON;
 pub struct Control {
     pub method: &'static Method,
     /// Largest error of a sub-step, as root mean square, relative to the spread of y at the beginning, or to how far y
-    /// has moved since then where that is more.
-    pub tolerance: f64,
+    /// has moved since then where that is more. None: errors are not estimated.
+    pub tolerance: Option<f64>,
+    /// What no sub-step may leave.
+    pub range: Range,
 }
 
-/// One step in sub-steps of controlled error.
+/// One step in sub-steps that may be rejected.
 pub struct Adaptive<'a> {
     control: Control,
     pool: &'a Pool,
@@ -51,7 +59,7 @@ pub struct Adaptive<'a> {
     rate: Vec<f64>,
     /// Length of the next sub-step, as far as accuracy is concerned.
     length: f64,
-    /// Beyond this length a sub-step failed, for this reason.
+    /// Beyond this length a sub-step failed, for this reason; longer ones are tried again after those that succeed.
     failure: Option<(f64, Error)>,
     /// Of the last sub-step, in units of what is allowed; none after a rejection.
     last: Option<f64>,
@@ -61,8 +69,8 @@ pub struct Adaptive<'a> {
 }
 
 impl<'a> Adaptive<'a> {
-    /// Prepares a step of `dt` from (t, y). The first sub-step is the one in which, at the present rate, y moves by
-    /// the share of its spread that the tolerance allows for an error of this order.
+    /// Prepares a step of `dt` from (t, y). With a tolerance the first sub-step is the one in which, at the present rate,
+    /// y moves by the share of its spread that the tolerance allows for an error of this order.
     ///
     /// # Errors
     /// `NoMemory`; any error of the system.
@@ -79,7 +87,7 @@ impl<'a> Adaptive<'a> {
         system.rate(t, y, &mut rate)?;
         let spread = sum::spread(pool, y.len(), |i| weight[i], |i| y[i]);
         let speed = sum::rms(pool, y.len(), |i| weight[i], |i| rate[i]);
-        let guess = control.tolerance.powf(control.exponent()) * (spread / speed);
+        let guess = control.tolerance.map_or(dt, |tolerance| tolerance.powf(control.exponent()) * (spread / speed));
         let length = if guess > 0.0 { guess.min(dt) } else { dt };
         let (trial, other) = (array()?, array()?);
         let (failure, last, rejected, slack) = (None, None, 0, 0.0);
@@ -100,10 +108,21 @@ impl<'a> Adaptive<'a> {
         })
     }
 
-    /// The next sub-step of a step of which `rest` is left: the rest in equal parts.
-    pub fn next(&self, rest: f64) -> f64 {
-        let most = self.failure.as_ref().map_or(f64::INFINITY, |f| f.0);
-        rest / (rest / self.length.min(most)).ceil().max(1.0)
+    /// The next sub-step of a step of which `rest` is left, none longer than `most`: the rest in equal parts.
+    pub fn next(&self, rest: f64, most: f64) -> f64 {
+        let failed = self.failure.as_ref().map_or(f64::INFINITY, |f| f.0);
+        // A little less than the quotient: its last digits differ from one system of units to another.
+        rest / ((1.0 - 1e-9) * (rest / self.length.min(failed).min(most))).ceil().max(1.0)
+    }
+
+    /// Whether y changes at all: with a rate of 0 everywhere it stays as it is, however long the step.
+    pub fn is_still(&self) -> bool {
+        sum::max(self.pool, self.rate.len(), |i| self.rate[i].abs()) <= 0.0
+    }
+
+    /// How far y has come from its beginning, root mean square.
+    pub fn moved(&self, y: &[f64]) -> f64 {
+        sum::rms(self.pool, y.len(), |i| self.weight[i], |i| y[i] - self.start[i])
     }
 
     /// Why sub-steps are as short as they are, where it is not for their errors.
@@ -111,12 +130,14 @@ impl<'a> Adaptive<'a> {
         self.failure.as_ref().map(|f| &f.1)
     }
 
-    /// Tries one sub-step of `schedule.dt` from (t, y); says whether y was advanced.
+    /// Tries one sub-step of `schedule.dt` from (t, y) by a method, the controlled one or one that takes its place; says
+    /// whether y was advanced.
     ///
     /// # Errors
     /// Any error of the system that a shorter sub-step would not mend.
     pub fn attempt(
         &mut self,
+        method: &'static Method,
         schedule: &Schedule,
         system: &mut dyn System,
         t: f64,
@@ -124,8 +145,9 @@ impl<'a> Adaptive<'a> {
         work: &mut Work,
     ) -> Result<bool> {
         let dt = schedule.dt;
-        let error = match self.estimate(schedule, system, t, y, work) {
-            Err(error) if shorter_may_do(&error) => {
+        let error = match self.estimate(method, schedule, system, t, y, work).and_then(|error| self.kept(error, system))
+        {
+            Err(error) if self.shorter_may_do(&error, system) => {
                 self.failure = Some((RETREAT * dt, error));
                 f64::INFINITY
             }
@@ -135,14 +157,40 @@ impl<'a> Adaptive<'a> {
         self.length = dt * self.factor(error);
         if accepted {
             y.copy_from_slice(&self.trial);
-            std::mem::swap(&mut self.rate, &mut self.other);
+            if self.control.tolerance.is_some() {
+                std::mem::swap(&mut self.rate, &mut self.other);
+            }
             self.slack += work.slack;
             self.last = Some(error);
+            self.failure.iter_mut().for_each(|(most, _)| *most = most.max(RECOVERY * dt));
         } else {
             self.rejected += 1;
             self.last = None;
         }
         Ok(accepted)
+    }
+
+    /// The error of what is in `trial`, if that is within its bounds, or is brought back.
+    fn kept(&mut self, error: f64, system: &mut dyn System) -> Result<f64> {
+        let range = self.control.range;
+        let Some(index) = range.first_outside(self.pool, &self.trial).filter(|_| error <= 1.0) else {
+            return Ok(error);
+        };
+        let value = self.trial[index];
+        if system.confine(range, CONFINED, &mut self.trial)? {
+            return Ok(error);
+        }
+        let promise = format!("{} keeps in short sub-steps", self.control.method.name);
+        Err(Error::OutOfBounds { index, value, low: range.low, high: range.high, promise })
+    }
+
+    /// Whether an error may be one of the sub-step's length: equations unsolved, bounds left, or a kappa asked for at a
+    /// stage that overshoots.
+    fn shorter_may_do(&self, error: &Error, system: &dyn System) -> bool {
+        match error {
+            Error::NotConverged { .. } => self.control.tolerance.is_some() || !system.is_linear(),
+            other => matches!(other, Error::BadElement { .. } | Error::OutOfBounds { .. }),
+        }
     }
 
     /// By what the length of a sub-step changes after this error.
@@ -163,6 +211,7 @@ impl<'a> Adaptive<'a> {
     /// Leaves the advanced y in `trial`, and returns its error in units of what is allowed.
     fn estimate(
         &mut self,
+        method: &'static Method,
         schedule: &Schedule,
         system: &mut dyn System,
         t: f64,
@@ -170,8 +219,10 @@ impl<'a> Adaptive<'a> {
         work: &mut Work,
     ) -> Result<f64> {
         self.trial.copy_from_slice(y);
-        let method = self.control.method;
         let (pool, dt) = (self.pool, schedule.dt);
+        if self.control.tolerance.is_none() {
+            return method.advance(schedule, system, pool, t, &mut self.trial, work).map(|()| 0.0);
+        }
         let Some(scale) = method.trapezoidal() else {
             let half = Schedule { dt: 0.5 * dt, ..*schedule };
             method.advance(&half, system, pool, t, &mut self.trial, work)?;
@@ -191,9 +242,8 @@ impl<'a> Adaptive<'a> {
 
     fn measure(&self, error: impl Fn(usize) -> f64 + Sync + Send) -> f64 {
         let (pool, n, weight) = (self.pool, self.trial.len(), |i: usize| self.weight[i]);
-        let moved = sum::rms(pool, n, weight, |i| self.trial[i] - self.start[i]);
-        let size = sum::max(pool, n, |i| self.trial[i].abs()).max(0.0);
-        let allowed = self.control.tolerance * self.spread.max(moved) + ROUNDING * size;
+        let (moved, size) = (self.moved(&self.trial), sum::max(pool, n, |i| self.trial[i].abs()));
+        let allowed = self.control.tolerance.unwrap_or(0.0) * self.spread.max(moved) + ROUNDING * size;
         let error = sum::rms(pool, n, weight, error);
         if error == 0.0 { 0.0 } else { error / allowed }
     }
@@ -217,10 +267,4 @@ impl Method {
             _ => None,
         }
     }
-}
-
-/// Whether an error may be one of the sub-step's length: equations unsolved, or a kappa asked for at a stage that
-/// overshoots.
-fn shorter_may_do(error: &Error) -> bool {
-    matches!(error, Error::NotConverged { .. } | Error::NotFinite { .. } | Error::BadElement { .. })
 }

@@ -31,13 +31,13 @@ fn run(method: &'static Method, tolerance: f64, start: f64) -> (f64, u32, u64) {
     let (pool, mut work, mut y, mut system) = (Pool::new(1).unwrap(), Work::default(), [start, 1.0], Pair([0.0; 2]));
     let bounds = if method.is_implicit() { Bounds { spectral: 0.0, diagonal: 0.0 } } else { BOUNDS };
     let weight = [1.0; 2];
-    let control = Control { method, tolerance };
+    let control = Control { method, tolerance: Some(tolerance), range: Range::FINITE };
     let mut pace = Adaptive::new(control, &pool, &weight, &mut system, (0.0, 2.0), &y).unwrap();
     let (mut t, mut accepted) = (0.0, 0);
     while t < 2.0 {
-        let part = pace.next(2.0 - t);
+        let part = pace.next(2.0 - t, f64::INFINITY);
         let schedule = method.schedule(part, bounds, &Options::default()).unwrap();
-        if pace.attempt(&schedule, &mut system, t, &mut y, &mut work).unwrap() {
+        if pace.attempt(method, &schedule, &mut system, t, &mut y, &mut work).unwrap() {
             t = if schedule.dt == 2.0 - t { 2.0 } else { t + schedule.dt };
             accepted += 1;
         }
@@ -77,16 +77,16 @@ fn a_constant_is_one_step_and_a_failure_is_passed_on() {
     let (pool, weight) = (Pool::new(1).unwrap(), [1.0; 3]);
     for method in METHODS {
         let (mut y, mut system, mut work) = ([1.0, 2.0, 4.0], Still(None), Work::default());
-        let control = Control { method, tolerance: 1e-6 };
+        let control = Control { method, tolerance: Some(1e-6), range: Range::FINITE };
         let mut pace = Adaptive::new(control, &pool, &weight, &mut system, (0.0, 7.0), &y).unwrap();
-        assert_eq!(pace.next(7.0), 7.0);
+        assert_eq!(pace.next(7.0, f64::INFINITY), 7.0);
         let schedule = Schedule { substeps: 1, stages: 5, dt: 7.0, total: 7.0, limits: Limits::default() };
-        assert_eq!(pace.attempt(&schedule, &mut system, 0.0, &mut y, &mut work), Ok(true), "{}", method.name);
+        assert_eq!(pace.attempt(method, &schedule, &mut system, 0.0, &mut y, &mut work), Ok(true), "{}", method.name);
         assert_eq!((y, pace.rejected), ([1.0, 2.0, 4.0], 0));
         system.0 = Some(Error::bad_at("kappa", 1, -1.0, "positive"));
-        assert_eq!(pace.attempt(&schedule, &mut system, 0.0, &mut y, &mut work), Ok(false));
-        assert!(pace.failure().is_some() && pace.next(7.0) < 2.0 && pace.rejected == 1);
+        assert_eq!(pace.attempt(method, &schedule, &mut system, 0.0, &mut y, &mut work), Ok(false));
+        assert!(pace.failure().is_some() && pace.next(7.0, f64::INFINITY) < 2.0 && pace.rejected == 1);
         system.0 = Some(Error::Cancelled);
-        assert_eq!(pace.attempt(&schedule, &mut system, 0.0, &mut y, &mut work), Err(Error::Cancelled));
+        assert_eq!(pace.attempt(method, &schedule, &mut system, 0.0, &mut y, &mut work), Err(Error::Cancelled));
     }
 }

@@ -118,7 +118,7 @@ fn solve(
     for _ in 0..CORRECTIONS {
         match system.rate(t, y, residual) {
             // Where a correction went too far, the rate may not be defined.
-            Err(Error::BadElement { .. } | Error::NotFinite { .. }) if taken.halve(pool, y, correction) => continue,
+            Err(Error::BadElement { .. }) if taken.halve(pool, y, correction) => continue,
             done => done?,
         }
         pool.update(residual, |start, part| {
@@ -137,8 +137,9 @@ fn solve(
         if rounding.is_nan() || rounding > ILLEGIBLE {
             return Err(unsolved(0, rounding, ILLEGIBLE));
         }
-        size = sum::max(pool, n, |i| base[i].abs().max(y[i].abs())).max(change).max(size);
-        wanted = limits.tolerance * change + rounding * size;
+        size = sum::max(pool, n, |i| y[i].abs()).max(change).max(size);
+        // The base of a second stage is as large as g times a rate: its rounding counts once.
+        wanted = limits.tolerance * change + rounding * size + ROUNDING * sum::max(pool, n, |i| base[i].abs());
         worst = sum::max(pool, n, |i| residual[i].abs());
         if worst <= wanted || n == 0 {
             return Ok((wanted.max(0.0), spent));

@@ -5,6 +5,7 @@ mod adaptive;
 mod explicit;
 mod implicit;
 mod krylov;
+mod range;
 mod stabilised;
 
 use crate::error::{Error, Result};
@@ -13,6 +14,7 @@ use crate::pool::Pool;
 pub use adaptive::{Adaptive, Control};
 use explicit::Tableau;
 pub use krylov::Limits;
+pub use range::Range;
 use stabilised::Recursion;
 
 /// What an integrator advances: dy/dt = rate(t, y).
@@ -25,6 +27,11 @@ pub trait System {
     /// self-adjoint and has no positive eigenvalue; 0 for what does not move.
     fn linearise(&mut self, _t: f64, _y: &[f64], _diagonal: &mut [f64], _weight: &mut [f64]) -> Result<Linear> {
         Ok(Linear::Unknown)
+    }
+
+    /// Whether the rate is linear in y: a stage whose equations are not solved in one length is not in a little less.
+    fn is_linear(&self) -> bool {
+        false
     }
 
     /// Writes A x to `ax`, with A as `linearise` fixed it.
@@ -42,6 +49,12 @@ pub trait System {
     /// Writes x such that y + x is uniform, and Σ weight x is 0, in each part of the system that A couples: what an endless
     /// step comes to. False where the system does not know its parts.
     fn flatten(&mut self, _shifted: Shifted, _y: &[f64], _x: &mut [f64]) -> Result<bool> {
+        Ok(false)
+    }
+
+    /// Brings a y that is a little outside a range back, as [`Range::confine`] does, with the parts and capacities that the
+    /// system knows. False where more than the share `most` would have to be moved, or the system knows no such thing.
+    fn confine(&mut self, _range: Range, _most: f64, _y: &mut [f64]) -> Result<bool> {
         Ok(false)
     }
 
@@ -254,8 +267,8 @@ impl Method {
         let stages = self.fewest_stages(part * bounds.spectral, most, options);
         let applications = substeps * f64::from(stages);
         if applications > options.max_applications as f64 {
-            let needed = applications as u64;
-            return Err(Error::StepTooLarge { dt, needed, allowed: options.max_applications });
+            let (allowed, remedy) = (options.max_applications, self.remedy().into());
+            return Err(Error::StepTooLarge { dt, needed: applications, allowed, remedy });
         }
         Ok(Schedule { substeps: substeps as u64, stages, dt: part, total: dt, limits })
     }
@@ -269,6 +282,16 @@ impl Method {
             Family::Implicit(tableau) => tableau.solves(),
         };
         self.interval(fewest) / bounds.spectral
+    }
+
+    /// What takes a step with fewer applications.
+    pub fn remedy(&self) -> &'static str {
+        if self.is_stabilised() { "choose integrator=auto or sdirk2" } else { "choose integrator=auto or rkl2" }
+    }
+
+    /// Whether stages are neither solved for nor as many as dt needs.
+    pub fn is_explicit(&self) -> bool {
+        matches!(self.family, Family::Explicit(_))
     }
 
     /// Whether the number of stages follows from the step.

@@ -23,7 +23,7 @@ pub enum Law {
 pub static LAWS: &[(&str, &str)] = &[
     (
         "power",
-        "kappa0 (T/T0)^n: 'power kappa0=1 T0=300 n=2.5'; T0 defaults to 1, kappa0 to 1; fronts into the cold need mean=arithmetic",
+        "kappa0 (T/T0)^n: 'power kappa0=1 T0=300 n=2.5'; T0 defaults to 1, kappa0 to 1; fronts into the cold need mean=arithmetic, the default of kappa(T)",
     ),
     ("table", "straight lines between points, constant outside: 'table T=300,400,600 kappa=1,1.2,2'"),
 ];

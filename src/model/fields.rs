@@ -80,7 +80,14 @@ pub static FIELDS: &[Field] = &[
     input("h_conv", "W/(m^2 K)", NonNegative, Some(0.0), "heat transfer coefficient to T_ambient (Robin)"),
     input("emissivity", "-", NonNegative, Some(0.0), "radiative exchange emissivity sigma_SB (T_ambient^4 - T^4)"),
     input("T_ambient", "K", Finite, Some(0.0), "temperature of the surroundings; absolute where there is emissivity"),
-    input("area", "m^2", NonNegative, None, "area that faces outside; without it, one face of a cube, V^((nu-1)/nu)"),
+    input("area", "m^2", NonNegative, None, "area that faces outside; without it, what the neighbours leave open"),
+    input(
+        "depth",
+        "m",
+        NonNegative,
+        None,
+        "of the particle's centre below its area: T there and at the area differ by the heat that flows, over kappa; without it, half a spacing",
+    ),
     input("kappa_par", "W/(m K)", NonNegative, None, "conductivity along b; with kappa_perp and b in place of kappa"),
     input("kappa_perp", "W/(m K)", NonNegative, None, "conductivity across b (without it, 0)"),
     input("b_x", "-", Finite, None, "direction of kappa_par, of any length and sign; 0: kappa_perp in all directions"),
@@ -111,7 +118,11 @@ pub static FIELDS: &[Field] = &[
     ),
     output("omega", "-", "grad-h factor"),
     vector(output("grad_T", "K/m", "temperature gradient, exact for linear fields")),
-    vector(output("flux", "W/m^2", "heat flux -kappa grad T")),
+    vector(output(
+        "flux",
+        "W/m^2",
+        "heat flux -kappa grad T, with kappa averaged as between particles: the same on both sides of a jump",
+    )),
     vector(output("b", "-", "b_x, b_y, b_z as one vector; setting it sets them")),
 ];
 
@@ -131,13 +142,14 @@ pub const H_CONV: Slot = 9;
 pub const EMISSIVITY: Slot = 10;
 pub const T_AMBIENT: Slot = 11;
 pub const AREA: Slot = 12;
-pub const KAPPA_PAR: Slot = 13;
-pub const KAPPA_PERP: Slot = 14;
+pub const DEPTH: Slot = 13;
+pub const KAPPA_PAR: Slot = 14;
+pub const KAPPA_PERP: Slot = 15;
 /// The first of three.
-pub const B: Slot = 15;
+pub const B: Slot = 16;
 /// The first of six: xx, yy, zz, xy, yz, xz.
-pub const KAPPA_IJ: Slot = 18;
-pub const INPUTS: usize = 24;
+pub const KAPPA_IJ: Slot = 19;
+pub const INPUTS: usize = 25;
 
 /// Inputs that make the conductivity a tensor.
 pub const TENSOR: std::ops::Range<Slot> = KAPPA_PAR..INPUTS;
@@ -192,6 +204,11 @@ pub static NUMBERS: &[Number] = &[
         "-",
         "energy that operator=consistent has made or lost since T was set, of what was out of balance, sum of m c_v |T - mean|; 0 for others, and where something heats, cools or is fixed",
     ),
+    result(
+        "bypassed",
+        "-",
+        "particles in layers so thin that pairs of particles which conduct ten times better reach over them",
+    ),
     result("growth_rate", "1/s", "largest real part in the operator's spectrum (Arnoldi): above 0 where a mode grows"),
     result("lowered_orders", "-", "particles whose consistent weights have a lower order than was asked for"),
     result("bytes", "bytes", "memory held for particles and weights"),
@@ -242,6 +259,7 @@ mod tests {
             (EMISSIVITY, "emissivity"),
             (T_AMBIENT, "T_ambient"),
             (AREA, "area"),
+            (DEPTH, "depth"),
             (KAPPA_PAR, "kappa_par"),
             (KAPPA_PERP, "kappa_perp"),
             (B, "b_x"),

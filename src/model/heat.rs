@@ -6,6 +6,7 @@ use super::conductivity::Law;
 use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::memory;
+use crate::operator::aggregate::{self, Couplings};
 use crate::operator::{Mean, Multigrid, Pairs};
 use crate::pool::Pool;
 use crate::sum;
@@ -14,6 +15,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// A host's function: fills the last slice for time t and temperatures T; the `u32`s are the host's particle numbers.
 /// A code other than 0 stops the step.
 pub type Callback = Box<dyn FnMut(f64, &[u32], &[f64], &mut [f64]) -> i32 + Send>;
+
+/// By how much T is raised to see how a source of the host's depends on it, relative to the largest |T|: half of a
+/// number's digits are left for the difference.
+const RAISED: f64 = 1.5e-8;
 
 /// Where the conductivity comes from.
 pub enum Conductivity<'a> {
@@ -55,8 +60,11 @@ pub struct Heat<'a> {
     pub quiet: bool,
     /// Set by the host from any thread to stop the step.
     pub cancel: &'a AtomicBool,
-    /// What exchange with the outside takes from dT/dt per kelvin, 1/s, as last linearised; empty where there is none.
+    /// What exchange with the outside and a source take from dT/dt per kelvin, 1/s, as last linearised; empty where there
+    /// is none.
     pub slopes: Vec<f64>,
+    /// Which particles exchange with which, directly or by way of others; none until it is asked for.
+    pub parts: &'a mut Option<Vec<u32>>,
     /// The preconditioner of implicit stages, empty until it is needed; none while it is at work.
     pub multigrid: Option<&'a mut Multigrid>,
     /// The least length of a stage, in explicit limits, for which it is used.
@@ -78,20 +86,67 @@ impl Heat<'_> {
         self.kappa_of_t(time, t)?;
         self.diffuse(t, rate)?;
         if let Some(surface) = self.surface {
-            surface.add(t, self.inverse_capacity, rate);
+            surface.add(self.evaluated_kappa(), t, self.inverse_capacity, rate);
         }
         self.release(time, t, rate)
     }
 
-    /// Linearises the exchange with the outside about these temperatures, for [`Heat::linear`].
+    /// Linearises the exchange with the outside and the source about these temperatures, for [`Heat::linear`].
     ///
     /// # Errors
-    /// `NoMemory`.
-    pub fn linearise_surface(&mut self, t: &[f64]) -> Result<()> {
+    /// As [`Heat::cooling`].
+    pub fn linearise_losses(&mut self, time: f64, t: &[f64]) -> Result<()> {
+        self.slopes = self.cooling(time, t)?;
         let Some(surface) = self.surface else { return Ok(()) };
-        self.slopes = memory::filled("slopes", t.len(), 0.0)?;
-        surface.slopes(t, |i, slope| self.slopes[i] = slope * self.inverse_capacity[i]);
+        let (mut slopes, inverse) = (std::mem::take(&mut self.slopes), self.inverse_capacity);
+        memory::extended("slopes", &mut slopes, t.len(), 0.0)?;
+        surface.slopes(self.evaluated_kappa(), t, |i, slope| slopes[i] += slope * inverse[i]);
+        self.slopes = slopes;
         Ok(())
+    }
+
+    /// How much faster each particle would cool per kelvin by the host's source, 1/s, from a difference; 0 where it heats
+    /// more when hotter, and empty where no function heats. A value is taken to depend on the T of its own particle.
+    ///
+    /// # Errors
+    /// `CallbackFailed`; `NotFinite` naming a particle whose source is not; `NoMemory`.
+    pub fn cooling(&mut self, time: f64, t: &[f64]) -> Result<Vec<f64>> {
+        let Release::Host(host, buffer) = &mut self.release else { return Ok(Vec::new()) };
+        let largest = sum::max(self.pool, t.len(), |i| t[i].abs());
+        let raise = RAISED * if largest > 0.0 { largest } else { 1.0 };
+        let raised = memory::collected("slopes", t.iter().map(|t| t + raise))?;
+        source_of(host, (time, self.host), &raised, buffer, self.pool)?;
+        let mut slopes = memory::copied("slopes", buffer)?;
+        source_of(host, (time, self.host), t, buffer, self.pool)?;
+        let (volume, inverse) = (self.volume, self.inverse_capacity);
+        self.pool.update(&mut slopes, |start, part| {
+            for (k, slope) in part.iter_mut().enumerate() {
+                let i = start + k;
+                *slope = ((buffer[i] - *slope) / (raised[i] - t[i]) * volume[i] * inverse[i]).max(0.0);
+            }
+        });
+        Ok(slopes)
+    }
+
+    /// For each particle the first one of those that it exchanges with, directly or by way of others. Where kappa depends
+    /// on T every pair counts.
+    ///
+    /// # Errors
+    /// `NoMemory`; `OutOfOrder` without stored weights.
+    pub fn parts(&mut self) -> Result<&[u32]> {
+        if self.parts.is_none() {
+            let (Pairs::Stored(matrix) | Pairs::Twice(_, matrix)) = self.pairs else {
+                return Err(Error::OutOfOrder { call: "parts".into(), missing: "stored weights".into() });
+            };
+            let kappa = self.pair_kappa().filter(|_| self.operator_is_fixed());
+            *self.parts = Some(aggregate::parts(&Couplings { matrix, kappa, factor: self.factor() })?);
+        }
+        Ok(self.parts.as_deref().unwrap_or(&[]))
+    }
+
+    /// Whether the rate depends on nothing but T: the host has lent no function, which may look at the time.
+    pub fn is_autonomous(&self) -> bool {
+        !matches!(self.release, Release::Host(..)) && !matches!(self.conductivity, Conductivity::Host(..))
     }
 
     /// The linear operator on x: the conductivity as evaluated last, the surface as linearised last.
@@ -113,8 +168,13 @@ impl Heat<'_> {
 
     /// Whether the rate is a linear function of T.
     pub fn is_linear(&self) -> bool {
+        !matches!(self.release, Release::Host(..)) && self.has_spectrum()
+    }
+
+    /// Whether the operator is a linear one that stays the same while T changes.
+    pub fn has_spectrum(&self) -> bool {
         let limited = matches!(self.pairs, Pairs::Twice(twice, _) if twice.is_limited());
-        !limited && !matches!(self.release, Release::Host(..)) && self.operator_is_fixed()
+        !limited && self.operator_is_fixed()
     }
 
     /// Whether the operator stays the same while T changes.
@@ -135,13 +195,25 @@ impl Heat<'_> {
         if self.surface.is_none() && matches!(self.release, Release::None) {
             return Ok(Some(0.0));
         }
+        let (rate, inverse) = (self.from_outside(time, t)?, self.inverse_capacity);
+        Ok(Some(sum::sum(self.pool, t.len(), |i| capacity(inverse[i]) * rate[i])))
+    }
+
+    /// The part of dT/dt that sources and surroundings make; empty where there are none.
+    ///
+    /// # Errors
+    /// As [`Heat::rate`].
+    pub fn from_outside(&mut self, time: f64, t: &[f64]) -> Result<Vec<f64>> {
+        if self.surface.is_none() && matches!(self.release, Release::None) {
+            return Ok(Vec::new());
+        }
         let mut rate = memory::filled("supply", t.len(), 0.0)?;
         if let Some(surface) = self.surface {
-            surface.add(t, self.inverse_capacity, &mut rate);
+            self.kappa_of_t(time, t)?;
+            surface.add(self.evaluated_kappa(), t, self.inverse_capacity, &mut rate);
         }
         self.release(time, t, &mut rate)?;
-        let inverse = self.inverse_capacity;
-        Ok(Some(sum::sum(self.pool, t.len(), |i| capacity(inverse[i]) * rate[i])))
+        Ok(rate)
     }
 
     /// The diffusive part of dT/dt alone, with the conductivity evaluated last.
@@ -171,9 +243,18 @@ impl Heat<'_> {
             (*radius, *centre) = (*radius * scale, *centre * scale);
         }
         if let Some(surface) = self.surface {
-            surface.slopes(t, |i, slope| circles[i].1 += slope * self.inverse_capacity[i]);
+            let inverse = self.inverse_capacity;
+            surface.slopes(self.evaluated_kappa(), t, |i, slope| circles[i].1 += slope * inverse[i]);
         }
         Ok(circles)
+    }
+
+    /// kappa(T) as evaluated last; empty where it does not depend on T.
+    fn evaluated_kappa(&self) -> &[f64] {
+        match &self.conductivity {
+            Conductivity::Law(_, kappa) | Conductivity::Host(_, kappa) => kappa,
+            _ => &[],
+        }
     }
 
     /// What all pair sums are multiplied by.
@@ -218,7 +299,7 @@ impl Heat<'_> {
             Release::None => return Ok(()),
             Release::Field(source) => source,
             Release::Host(host, buffer) => {
-                called("source", host(time, self.host, t, buffer))?;
+                source_of(host, (time, self.host), t, buffer, self.pool)?;
                 buffer
             }
         };
@@ -236,6 +317,25 @@ impl Heat<'_> {
 /// m c_v from its inverse; 0 where T is fixed.
 pub fn capacity(inverse: f64) -> f64 {
     if inverse > 0.0 { 1.0 / inverse } else { 0.0 }
+}
+
+/// The host's source for temperatures `t`, all of it finite.
+fn source_of(
+    host: &mut Callback,
+    (time, particles): (f64, &[u32]),
+    t: &[f64],
+    source: &mut [f64],
+    pool: &Pool,
+) -> Result<()> {
+    called("source", host(time, particles, t, source))?;
+    match sum::first(pool, t.len(), |i| !source[i].is_finite()) {
+        None => Ok(()),
+        Some(i) => {
+            // Not an error that a shorter sub-step may mend: asked again, it could hide.
+            let what = format!("the source callback's value at T = {}", t[i]);
+            Err(Error::NotFinite { what, index: particles[i] as usize, value: source[i] })
+        }
+    }
 }
 
 fn called(which: &str, code: i32) -> Result<()> {

@@ -47,6 +47,31 @@ impl Graph for Couplings<'_> {
     }
 }
 
+/// For each point the first one of those that it is coupled to, directly or by way of others.
+///
+/// # Errors
+/// `NoMemory`.
+pub fn parts(graph: &impl Graph) -> Result<Vec<u32>> {
+    let n = graph.points();
+    let mut part = memory::filled("coupled parts", n, NONE)?;
+    let mut ahead = memory::reserved("coupled parts", n)?;
+    for first in 0..n {
+        if part[first] == NONE {
+            part[first] = first as u32;
+            ahead.push(first);
+        }
+        while let Some(i) = ahead.pop() {
+            graph.visit(i, |j, c| {
+                if part[j] == NONE && c != 0.0 {
+                    part[j] = first as u32;
+                    ahead.push(j);
+                }
+            });
+        }
+    }
+    Ok(part)
+}
+
 /// The aggregate of each point, and how many there are.
 pub struct Aggregates {
     pub of: Vec<u32>,

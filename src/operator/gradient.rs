@@ -11,32 +11,46 @@ use nalgebra::{Matrix3, Vector3};
 /// Directions in which the neighbours spread less than this, relative to the best one, carry no gradient.
 const FLAT: f64 = 1e-8;
 
-/// ∇f at each particle, units of f per length; 0 along directions in which a particle has no neighbours.
-pub fn of(f: &[f64], kernel: &Kernel, rows: &Rows, volume: &[f64], pool: &Pool) -> Result<Vec<Axes<f64>>> {
-    let mut out = memory::filled("gradients", f.len(), [0.0; 3])?;
+/// ∇f at each particle from the differences f_b − f_a = `rise(a, b)`, units of f per length; 0 along directions in which
+/// a particle has no neighbours.
+pub fn of(
+    rise: impl Fn(usize, usize) -> f64 + Sync + Send,
+    kernel: &Kernel,
+    rows: &Rows,
+    volume: &[f64],
+    pool: &Pool,
+) -> Result<Vec<Axes<f64>>> {
+    let mut out = memory::filled("gradients", volume.len(), [0.0; 3])?;
     rows.map(pool, &mut out, |(q, slope): &mut (Vec<f64>, Vec<f64>), row: Row| {
         let inverse = 1.0 / rows.h[row.i];
         q.clear();
         q.extend(row.r.iter().map(|r| r * inverse));
         slope.resize(q.len(), 0.0);
         kernel.slope_over_q(q, slope);
-        Ok(of_row(f, kernel.dim(), inverse, slope, volume, &row))
+        Ok(of_row(&rise, kernel.dim(), inverse, slope, volume, &row))
     })?;
     Ok(out)
 }
 
 /// Everything in units of h, so that the matrix is of order one in any system of units.
-fn of_row(f: &[f64], dim: usize, inverse: f64, slope: &[f64], volume: &[f64], row: &Row) -> Axes<f64> {
-    let (mut spread, mut rise) = (Matrix3::zeros(), Vector3::zeros());
+fn of_row(
+    rise: impl Fn(usize, usize) -> f64,
+    dim: usize,
+    inverse: f64,
+    slope: &[f64],
+    volume: &[f64],
+    row: &Row,
+) -> Axes<f64> {
+    let (mut spread, mut risen) = (Matrix3::zeros(), Vector3::zeros());
     let scale = inverse.powi(dim as i32);
     for (k, (&j, slope)) in row.j.iter().zip(slope).enumerate() {
         let mut d = Vector3::zeros();
         (0..dim).for_each(|a| d[a] = row.d[a][k] * inverse);
         let weight = -slope * scale * volume[j as usize];
         spread += weight * d * d.transpose();
-        rise += weight * (f[j as usize] - f[row.i]) * d;
+        risen += weight * rise(row.i, j as usize) * d;
     }
-    let gradient = pseudo_inverse(spread) * rise * inverse;
+    let gradient = pseudo_inverse(spread) * risen * inverse;
     [gradient[0], gradient[1], gradient[2]]
 }
 

@@ -29,6 +29,19 @@ impl Mean {
         MEANS.iter().find(|(_, mean, _)| *mean == self).map_or("", |(name, ..)| name)
     }
 
+    /// What a gradient at a particle of conductivity `a` makes of its difference to one of conductivity `b`, so that `a`
+    /// times it is what flows: mean/a for the harmonic mean, whose differences lie mostly on the side that conducts less;
+    /// 1 for the arithmetic mean, which is that of the fluxes on both sides. Between 0 and 2.
+    #[inline(always)]
+    pub fn share(self, a: f64, b: f64) -> f64 {
+        match self {
+            Mean::Harmonic if a < b => 2.0 / (1.0 + a / b),
+            Mean::Harmonic if b > 0.0 => 2.0 * (b / a / (1.0 + b / a)),
+            Mean::Harmonic => 0.0,
+            Mean::Arithmetic | Mean::Geometric => 1.0,
+        }
+    }
+
     #[inline(always)]
     pub fn of(self, a: f64, b: f64) -> f64 {
         match self {
@@ -62,6 +75,12 @@ mod tests {
             }
             assert_eq!(Mean::find(mean.name()).unwrap(), *mean);
         }
+        for (a, b) in [(1.0, 3.0), (3.0, 1.0), (1e-200, 1e200), (1e200, 1e-100), (2.0, 0.0)] {
+            let share = Mean::Harmonic.share(a, b);
+            assert!((0.0..=2.0).contains(&share), "{share}");
+            assert!((a * share - Mean::Harmonic.of(a, b)).abs() <= 4e-16 * a * share, "{a} {b}");
+        }
+        assert_eq!([Mean::Harmonic.share(0.0, 0.0), Mean::Harmonic.share(7.7, 7.7)], [0.0, 1.0]);
         assert_eq!(Mean::Harmonic.of(1.0, 3.0), 1.5);
         assert_eq!(Mean::Harmonic.of(0.0, 3.0), 0.0);
         assert!(Mean::find("harmonik").is_err());

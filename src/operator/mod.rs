@@ -16,6 +16,7 @@
 pub mod aggregate;
 mod apart;
 pub mod arnoldi;
+pub mod bypass;
 pub mod consistent;
 pub mod gradient;
 mod ldl;
@@ -33,6 +34,7 @@ mod stencils;
 pub mod table;
 pub mod tensor;
 pub mod twice;
+pub mod walls;
 
 pub use matrix::Matrix;
 pub use mean::Mean;

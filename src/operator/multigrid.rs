@@ -4,7 +4,7 @@
 //! itself. Each level above has one unknown for each aggregate of the level below, and L is carried over by
 //! P^T L P (Galerkin). M is lumped, so that all but the diagonals and the last level's factors serve any g.
 
-use super::aggregate::{Graph, NONE, aggregates};
+use super::aggregate::{Graph, NONE, aggregates, parts};
 use super::sparse::Sparse;
 use super::spectrum;
 use crate::error::Result;
@@ -279,28 +279,6 @@ fn average(graph: &impl Graph, i: usize, x: &[f64], diagonal: f64) -> f64 {
 /// The step of a point with this diagonal; where nothing is coupled the diagonal is the equation.
 fn damped(step: f64, diagonal: f64) -> f64 {
     if diagonal > 0.0 { step } else { 1.0 }
-}
-
-/// For each point the first one of those that it is coupled to, directly or by way of others.
-fn parts(couplings: &Sparse) -> Result<Vec<u32>> {
-    let n = couplings.rows();
-    let mut part = memory::filled("coupled parts", n, NONE)?;
-    let mut ahead = memory::reserved("coupled parts", n)?;
-    for first in 0..n {
-        if part[first] == NONE {
-            part[first] = first as u32;
-            ahead.push(first);
-        }
-        while let Some(i) = ahead.pop() {
-            couplings.visit(i, |j, c| {
-                if part[j] == NONE && c != 0.0 {
-                    part[j] = first as u32;
-                    ahead.push(j);
-                }
-            });
-        }
-    }
-    Ok(part)
 }
 
 /// Point i takes its aggregate's value and, as one step of relaxation would, its neighbours' by their couplings: a

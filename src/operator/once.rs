@@ -119,11 +119,11 @@ impl Assembly<'_> {
         }
         let mut matrix = Matrix::new(n, blocks);
         match self.operator.tensor {
-            Tensor::Stencils => {
-                self.symmetrise(&mut matrix, pool)?;
-                normals = moments::normals(self, &matrix, pool)?;
-            }
-            Tensor::Projected => {
+            Tensor::Stencils | Tensor::Projected => {
+                if matches!(self.operator.tensor, Tensor::Stencils) {
+                    self.symmetrise(&mut matrix, pool)?;
+                    normals = moments::normals(self, &matrix, pool)?;
+                }
                 normalise::scale(self, &mut matrix, &normals, pool)?;
                 projected::project(self, &mut matrix, pool)?;
                 let unmet = moments::conduction(self, &matrix, pool)?;
@@ -145,7 +145,7 @@ impl Assembly<'_> {
     /// `NoMemory`.
     pub fn normalise(&self, matrix: &mut Matrix, normals: &Normals, pool: &Pool) -> Result<()> {
         match self.operator.tensor {
-            Tensor::Projected => Ok(()),
+            Tensor::Stencils | Tensor::Projected => Ok(()),
             _ => normalise::scale(self, matrix, normals, pool),
         }
     }

@@ -12,6 +12,7 @@
 //! stays 0.
 
 use super::once::Assembly;
+use super::tensor::{self, Sym};
 use super::{Matrix, apart};
 use crate::error::Result;
 use crate::memory;
@@ -54,7 +55,8 @@ fn project_in<const D: usize, const C: usize>(assembly: &Assembly, matrix: &mut 
     let unit = sum::max(pool, n, |i| assembly.rows.h[i]);
     // Single precision holds the conditions to 1e-7.
     let apart = apart::of(assembly.rows, unit, pool)?;
-    let problem = Problem::<D, C> { pool, prior: matrix, apart: &apart, volume: assembly.volume, unit };
+    let shape = assembly.shape.filter(|_| assembly.operator.takes_tensors());
+    let problem = Problem::<D, C> { pool, prior: matrix, apart: &apart, volume: assembly.volume, unit, shape };
     let lambda = problem.newton()?;
     let (apart, lambda) = (&apart[..], &lambda[..]);
     matrix.update(pool, move |i, j, at, g| g * factor(&psi(&apart[i / BLOCK][at]), &lambda[i], &lambda[j]));
@@ -107,6 +109,8 @@ struct Problem<'a, const D: usize, const C: usize> {
     volume: &'a [f64],
     /// Of length.
     unit: f64,
+    /// The second moments wanted, where they are not I.
+    shape: Option<&'a [Sym]>,
 }
 
 /// Particles a and b, the place of the pair in a's block, and g_ab.
@@ -194,10 +198,23 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
         let target = |i: usize| self.volume[i] / (self.unit * self.unit);
         self.each(lacks, |i, lacks| match waived[i] {
             true => lacks.fill(0.0),
-            false => squares::<D>().for_each(|at| lacks[at] += target(i)),
+            false => *lacks += self.second(i) * target(i),
         });
         let squared = |i: usize| (lacks[i] / target(i)).norm_squared();
         (sum::sum(self.pool, lacks.len(), squared) / (lacks.len() * C).max(1) as f64).sqrt()
+    }
+
+    /// The moments that a particle is to have, per volume: no first ones, and S or I.
+    fn second(&self, i: usize) -> Vector<C> {
+        let (mut moments, mut at) = (Vector::zeros(), D);
+        for k in 0..D {
+            for l in k..D {
+                moments[at] =
+                    self.shape.map_or(f64::from(u8::from(k == l)), |shape| tensor::component(&shape[i], k, l));
+                at += 1;
+            }
+        }
+        moments
     }
 
     /// Which pairs are not at 0.

@@ -154,8 +154,8 @@ pub static OPERATORS: &[Operator] = &[
     },
     Operator {
         name: "monotone",
-        about: "tensor kappa: positive pair weights nearest to Brookshaw's that have its moments; symmetric, conservative, \
-                monotone at any anisotropy; leaks across b",
+        about: "tensor kappa: positive pair weights nearest to Brookshaw's that have its moments, particle by particle and \
+                then all together; symmetric, conservative, monotone at any anisotropy; takes time to make; leaks across b",
         positive: true,
         dissipative: true,
         normalise: Normalise::Pair,
@@ -180,10 +180,17 @@ impl Operator {
         matches!(self.tensor, Tensor::Stencils | Tensor::Projected | Tensor::Consistent)
     }
 
+    /// Whether exchanges with particles of fixed T are completed by what lies behind them: weights are exchanges, and
+    /// none is negative beside a wall.
+    pub fn completes_walls(&self) -> bool {
+        let weighs = self.positive || matches!(self.tensor, Tensor::Angular(_) | Tensor::Consistent);
+        weighs && self.is_one_matrix()
+    }
+
     /// Bytes that making weights takes beside them while it lasts: for each pair, and for each particle.
     pub fn bytes_to_make(&self, dim: usize) -> [f64; 2] {
         match self.tensor {
-            Tensor::Projected => projected::bytes(dim),
+            Tensor::Projected | Tensor::Stencils => projected::bytes(dim),
             _ => [0.0; 2],
         }
     }

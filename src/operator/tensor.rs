@@ -14,6 +14,11 @@ pub fn unit(dim: usize) -> Sym {
     std::array::from_fn(|k| f64::from(k < dim))
 }
 
+/// The component of row k and column l.
+pub fn component(s: &Sym, k: usize, l: usize) -> f64 {
+    s[[[0, 3, 5], [3, 1, 4], [5, 4, 2]][k][l]]
+}
+
 /// s v
 pub fn times(s: &Sym, v: Axes<f64>) -> Axes<f64> {
     [

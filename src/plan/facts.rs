@@ -2,7 +2,7 @@
 
 use super::Choices;
 use super::preconditioner::Preconditioning;
-use crate::operator::Normalise;
+use crate::operator::{Mean, Normalise};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
@@ -20,6 +20,8 @@ pub struct Facts {
     pub kappa_of_t: bool,
     /// The host has changed kappa since the weights were made.
     pub kappa_changes: bool,
+    /// Of kappa between two particles.
+    pub mean: Mean,
     /// Particles that exchange heat with the outside.
     pub exchanging: usize,
     pub heated: bool,
@@ -33,18 +35,24 @@ pub struct Facts {
     pub twice: bool,
     /// A weight depends on more than the row that it is in.
     pub joined: bool,
-    /// How wrong projected weights conduct, once they are made.
+    /// How wrong weights that were projected conduct, once they are made.
     pub defect: Option<f64>,
-    /// Weights differ from the two sides of a pair, and modes that grow are refused.
-    pub one_sided: bool,
+    /// Weights answer to particles of fixed T.
+    pub walls: bool,
+    /// Particles beside ones that conduct much better, and those of them that pairs reach over.
+    pub bypassed: (usize, usize),
+    /// Nothing about the operator rules out modes that grow, and they are refused.
+    pub may_grow: bool,
     /// The operator has no negative weight.
     pub positive: bool,
-    /// The integrator promises the maximum principle, and nothing heats.
+    /// T stays where the maximum principle has it.
     pub keeps_bounds: bool,
     pub operator: &'static str,
     pub integrator: &'static str,
     /// What was chosen, and why, where the choice is ours.
     pub auto: Option<String>,
+    /// Errors of sub-steps are estimated.
+    pub controlled: bool,
     /// The integrator solves for its stages.
     pub implicit: bool,
     /// How the equations of its stages are preconditioned.
@@ -67,7 +75,7 @@ impl Facts {
             choices.kernel.name(),
             choices.h_fac,
             self.operator,
-            choices.mean.name(),
+            self.mean.name(),
             self.integrator
         )
     }

@@ -49,26 +49,33 @@ pub struct Plan {
     pub left_out: Vec<&'static Rule>,
     /// Rules that would hold, switched off by `without=`.
     pub disabled: Vec<&'static Rule>,
+    /// What a host should know before it believes the answer.
+    pub notes: Vec<String>,
 }
+
+/// Of the particles beside ones that conduct much better: the share that pairs may reach over without a word. Corners of
+/// thick bodies are less.
+const BYPASSED: f64 = 0.1;
 
 impl Plan {
     /// Compiles the plan of a scene.
     pub fn new(choices: &Choices, facts: &Facts) -> Plan {
         let (disabled, left_out): (Vec<_>, Vec<_>) =
-            RULES.iter().filter(|r| (r.holds)(facts)).partition(|r| choices.without(r.name));
-        let mut plan = Plan { title: facts.title(choices), passes: Vec::new(), left_out, disabled };
+            RULES.iter().copied().filter(|r| (r.holds)(facts)).partition(|r| choices.without(r));
+        let mut plan =
+            Plan { title: facts.title(choices), passes: Vec::new(), left_out, disabled, notes: notes(facts) };
         plan.passes = plan.list(choices, facts);
         plan
     }
 
     /// Whether a rule holds here and is not switched off.
-    pub fn leaves_out(&self, rule: &str) -> bool {
-        self.left_out.iter().any(|r| r.name == rule)
+    pub fn leaves_out(&self, rule: &Rule) -> bool {
+        self.left_out.contains(&rule)
     }
 
     fn list(&self, choices: &Choices, facts: &Facts) -> Vec<Pass> {
         let (n, pairs) = (facts.n as f64, facts.n as f64 * facts.neighbours);
-        let setup = if self.leaves_out("at_rest") { When::Once } else { When::EachStep };
+        let setup = if self.leaves_out(&rules::AT_REST) { When::Once } else { When::EachStep };
         let mut list = Vec::new();
         let mut add = |name, when, bytes, pairs, about: String| list.push(Pass { name, about, when, bytes, pairs });
         add("sort", setup, n * (8.0 * facts.dim as f64 + 4.0), 0.0, "particles along a Morton curve".into());
@@ -76,7 +83,8 @@ impl Plan {
             let what = if facts.finds_h { "rho and h together" } else { "rho by summation" };
             add("density", setup, 16.0 * n, pairs, what.into());
         }
-        let evaluations = if self.leaves_out("same_h") { "one kernel evaluation" } else { "two kernel evaluations" };
+        let evaluations =
+            if self.leaves_out(&rules::SAME_H) { "one kernel evaluation" } else { "two kernel evaluations" };
         add(
             "weights",
             setup,
@@ -94,18 +102,18 @@ impl Plan {
         if normalise != Normalise::No && pair == 0.0 {
             add("normalise", setup, n * normalise.bytes(facts.dim), pairs, normalise.about().into());
         }
-        if self.leaves_out("frozen") && !self.leaves_out("uniform_kappa") {
-            add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", choices.mean.name()));
+        if self.leaves_out(&rules::FROZEN) && !self.leaves_out(&rules::UNIFORM_KAPPA) {
+            add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", facts.mean.name()));
         }
-        if self.leaves_out("rate_only") {
+        if self.leaves_out(&rules::RATE_ONLY) {
             add("rate", When::EachStep, 0.0, pairs, "du/dt for a host that integrates itself".into());
         } else {
             self.list_motion(facts, setup, &mut add);
         }
-        if !self.leaves_out("no_wall") {
+        if !self.leaves_out(&rules::NO_WALL) {
             add("surface", When::EachStage, 48.0 * facts.exchanging as f64, 0.0, "exchange with the outside".into());
         }
-        if !self.leaves_out("no_source") {
+        if !self.leaves_out(&rules::NO_SOURCE) {
             add("source", When::EachStage, 8.0 * n, 0.0, "heat released in the volume".into());
         }
         list
@@ -119,7 +127,7 @@ impl Plan {
             let about = "Gershgorin's circles; power iteration where it saves stages";
             add("bound", bound_when, 0.0, pairs, about.into());
         }
-        if !self.leaves_out("decays") && !facts.kappa_of_t {
+        if !self.leaves_out(&rules::DECAYS) && !facts.kappa_of_t {
             add("spectrum", setup, 320.0 * n, 40.0 * pairs, "Arnoldi's method: refused where a mode grows".into());
         }
         if facts.kappa_of_t {
@@ -138,7 +146,7 @@ impl Plan {
         if facts.keeps_bounds {
             promises.push("within the bounds of before");
         }
-        if !self.leaves_out("positive") {
+        if !self.leaves_out(&rules::POSITIVE) {
             promises.push("no growth");
         }
         add("check", When::EachStep, 0.0, 0.0, promises.join(", "));
@@ -171,8 +179,21 @@ impl fmt::Display for Plan {
             Ok(())
         };
         section("left out", &self.left_out)?;
-        section("could be left out, but without= says no", &self.disabled)
+        section("could be left out, but without= says no", &self.disabled)?;
+        self.notes.iter().try_for_each(|note| writeln!(f, "note: {note}"))
     }
+}
+
+fn notes(facts: &Facts) -> Vec<String> {
+    let (beside, over) = facts.bypassed;
+    let thin = over as f64 > BYPASSED * beside as f64;
+    let layers = || {
+        format!(
+            "{over} particles lie in layers so thin that pairs of particles which conduct ten times better reach over \
+             them: too much heat passes; such a layer must be thicker than a support (more particles, or a smaller h_fac)"
+        )
+    };
+    thin.then(layers).into_iter().collect()
 }
 
 /// 1234567 as `1.2 M`.

@@ -2,9 +2,9 @@
 
 use super::report::{Report, Timers};
 use super::state::Progress;
-use super::{Choices, Plan};
+use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
-use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Schedule, Shifted, System, Work};
+use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Range, Schedule, Shifted, System, Work};
 use crate::memory;
 use crate::model::heat::{self, Heat};
 use crate::operator::multigrid::Fine;
@@ -17,6 +17,9 @@ use std::time::Instant;
 /// symmetric scatter by less.
 const GROWS: f64 = 1e-3;
 
+/// Explicit limits from which it is worth one rate to see whether anything changes at all.
+const WORTH_A_LOOK: f64 = 8.0;
+
 /// A prepared right-hand side and what it takes to move it.
 pub struct Motion<'a> {
     pub heat: Heat<'a>,
@@ -28,13 +31,19 @@ pub struct Motion<'a> {
     pub timers: &'a mut Timers,
     /// What was found out about the operator as it still is.
     pub known: &'a mut Option<Known>,
+    /// What T must not leave.
+    pub range: Range,
 }
 
-/// Bounds on an operator, and whether power iteration has lowered them.
+/// Bounds on an operator.
 #[derive(Debug, Clone, Copy)]
 pub struct Known {
-    pub bounds: Bounds,
-    refined: bool,
+    /// Gershgorin's: what every step finds first, whatever steps were before it.
+    pub proven: Bounds,
+    /// The same, lowered by power iteration, where that was needed.
+    refined: Option<Bounds>,
+    /// No bound on the spectrum can be less.
+    floor: f64,
 }
 
 impl System for Heat<'_> {
@@ -50,8 +59,15 @@ impl System for Heat<'_> {
         }
         diagonal.iter_mut().zip(&circles).for_each(|(d, circle)| *d = circle.1);
         weight.iter_mut().zip(self.inverse_capacity).for_each(|(w, &i)| *w = heat::capacity(i));
-        self.linearise_surface(y)?;
+        self.linearise_losses(t, y)?;
+        // Those of the surface are in the circles.
+        let cooling = self.cooling(t, y)?;
+        diagonal.iter_mut().zip(&cooling).for_each(|(d, c)| *d += c);
         Ok(if self.is_linear() { Linear::Exact } else { Linear::Frozen })
+    }
+
+    fn is_linear(&self) -> bool {
+        Heat::is_linear(self)
     }
 
     fn apply(&mut self, x: &[f64], ax: &mut [f64]) -> Result<()> {
@@ -64,6 +80,11 @@ impl System for Heat<'_> {
 
     fn flatten(&mut self, shifted: Shifted, y: &[f64], x: &mut [f64]) -> Result<bool> {
         Heat::flatten(self, fine(self.pool, shifted), y, x)
+    }
+
+    fn confine(&mut self, range: Range, most: f64, y: &mut [f64]) -> Result<bool> {
+        let capacities = memory::collected("capacities", self.inverse_capacity.iter().map(|&i| heat::capacity(i)))?;
+        range.confine(self.parts()?, &capacities, most, y)
     }
 
     fn supply(&mut self, t: f64, y: &[f64]) -> Result<Option<f64>> {
@@ -81,83 +102,97 @@ pub fn explicit_limit(bounds: Bounds) -> f64 {
     2.0 / bounds.spectral
 }
 
+/// Bounds on an operator to which a decay at this rate is added everywhere.
+fn raised(bounds: Bounds, rate: f64) -> Bounds {
+    Bounds { spectral: bounds.spectral + rate, diagonal: bounds.diagonal + rate }
+}
+
 impl Motion<'_> {
     /// Advances `t` by exactly `dt` from `time`. Where the operator changes with T, bounds and schedule are made anew
     /// for each sub-step.
     pub fn advance(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
-        if let Some(tolerance) = self.choices.tolerance.filter(|_| dt > 0.0 && !t.is_empty()) {
-            return self.adapt(tolerance, (time, dt), t, report);
+        if dt == 0.0 || t.is_empty() {
+            return Ok(());
         }
-        if self.choices.method.is_implicit() {
-            return self.solve(time, dt, t, report);
+        let start = Instant::now();
+        let method = self.choices.method;
+        let in_range = !self.range.is_bound() || (method.ssp > 0.0 && self.is_fixed());
+        match method.is_explicit() && self.choices.tolerance.is_none() && in_range {
+            true => self.march(time, dt, t, report)?,
+            false => self.adapt(time, dt, t, report)?,
         }
-        let reference = self.norm(|i| t[i]);
-        let mut done = 0.0;
-        while done < dt && !t.is_empty() {
+        self.timers.add(if method.is_implicit() { "solve" } else { "stages" }, start.elapsed());
+        Ok(())
+    }
+
+    /// Sub-steps of an explicit method that are as long as it is stable, and keeps bounds: none is ever rejected.
+    fn march(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        let (mut done, before, allowed) = (0.0, self.heat.applications, self.choices.options.max_applications);
+        while done < dt {
+            let needed = (self.heat.applications - before) as f64;
+            if needed > allowed as f64 {
+                return Err(Error::StepTooLarge {
+                    dt,
+                    needed: needed * (dt / done),
+                    allowed,
+                    remedy: self.remedy().into(),
+                });
+            }
             let bounds = self.bounds(time + done, dt - done, t)?;
-            let part = self.practical_limit(time + done, t, bounds, reference)?.min(dt - done);
-            let (method, schedule) = self.schedule(part, bounds)?;
             if report.substeps == 0 {
                 report.limit = explicit_limit(bounds);
+                if dt > WORTH_A_LOOK * report.limit && self.is_still(time, t)? {
+                    report.substeps = 1;
+                    return self.tell(time, dt, dt);
+                }
             }
+            let schedule = self.choices.method.schedule(dt - done, bounds, &self.choices.options)?;
             report.stages = schedule.stages.into();
-            let start = Instant::now();
-            let steps = if self.heat.operator_is_fixed() { schedule.substeps } else { 1 };
+            let steps = if self.is_fixed() { schedule.substeps } else { 1 };
             for k in 0..steps {
                 let now = time + done + schedule.start(k);
-                method.advance(&schedule, &mut self.heat, self.pool, now, t, self.work)?;
+                self.choices.method.advance(&schedule, &mut self.heat, self.pool, now, t, self.work)?;
                 report.substeps += 1;
                 self.tell(time, dt, done + schedule.start(k + 1))?;
             }
-            self.timers.add("stages", start.elapsed());
-            let to_the_end = part == dt - done && steps == schedule.substeps;
-            done = if to_the_end { dt } else { done + schedule.start(steps) };
+            done = if steps == schedule.substeps { dt } else { done + schedule.start(steps) };
         }
         Ok(())
     }
 
-    /// One sub-step of an implicit method: stable whatever dt is.
-    fn solve(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
-        let calm = Bounds { spectral: 0.0, diagonal: 0.0 };
-        let (method, options) = (self.choices.method, &self.choices.options);
-        let schedule = method.schedule(dt, calm, options)?;
-        if schedule.substeps == 0 || t.is_empty() {
-            return Ok(());
-        }
-        let start = Instant::now();
-        report.limit = explicit_limit(self.known_or_proven(time, t)?.bounds);
-        method.advance(&schedule, &mut self.heat, self.pool, time, t, self.work)?;
-        self.timers.add("solve", start.elapsed());
-        (report.substeps, report.stages) = (1, schedule.stages.into());
-        self.tell(time, dt, dt)
-    }
-
-    /// Sub-steps of the length that a tolerance allows, none longer than is stable.
-    fn adapt(&mut self, tolerance: f64, (time, dt): (f64, f64), t: &mut [f64], report: &mut Report) -> Result<()> {
-        let (method, options) = (self.choices.method, &self.choices.options);
-        let (start, before, volume) = (Instant::now(), self.heat.applications, self.heat.volume);
-        // No tolerance makes a step possible that is too long for stability alone.
+    /// Sub-steps that are rejected where they miss a tolerance, leave bounds or do not converge, none longer than is
+    /// stable.
+    fn adapt(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
+        let (choices, before, volume) = (self.choices, self.heat.applications, self.heat.volume);
+        let (method, options) = (choices.method, &choices.options);
         let bounds = self.stability(time, dt, t)?;
-        let mut schedule = method.schedule(dt, bounds, options)?;
         report.limit =
-            explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.bounds } else { bounds });
-        let control = Control { method, tolerance };
+            explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.proven } else { bounds });
+        let control = Control { method, tolerance: choices.tolerance, range: self.range };
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
+        if pace.is_still() && self.heat.is_autonomous() {
+            (report.substeps, report.stages) = (1, 1);
+            return self.tell(time, dt, dt);
+        }
+        // Nothing makes a step possible that is too long for stability alone: it is refused before any work.
+        method.schedule(dt, bounds, options)?;
+        let reference = self.norm(|i| t[i]).max(dt * self.heat_from_outside(time, t)?);
         let mut done = 0.0;
         while done < dt {
             let (now, rest) = (time + done, dt - done);
-            let part = pace.next(rest);
+            let most = self.practical_limit(now, t, reference.max(pace.moved(t)))?;
+            let part = pace.next(rest, most);
             let bounds = self.stability(now, part, t)?;
-            schedule = method.schedule(part, bounds, options)?;
-            if pace.attempt(&schedule, &mut self.heat, now, t, self.work)? {
+            let (method, schedule) = self.schedule(part, bounds)?;
+            report.stages = schedule.stages.into();
+            if pace.attempt(method, &schedule, &mut self.heat, now, t, self.work)? {
                 done = if schedule.dt == rest { dt } else { done + schedule.dt };
                 report.substeps += 1;
                 self.tell(time, dt, done)?;
             }
             self.refuse_what_does_not_end(&pace, (dt, dt - done), self.heat.applications - before)?;
         }
-        self.timers.add(if method.is_implicit() { "solve" } else { "stages" }, start.elapsed());
-        (report.stages, report.rejected, self.work.slack) = (schedule.stages.into(), pace.rejected, pace.slack);
+        (report.rejected, self.work.slack) = (pace.rejected, pace.slack);
         Ok(())
     }
 
@@ -167,34 +202,84 @@ impl Motion<'_> {
         if self.choices.method.is_implicit() { Ok(calm) } else { self.bounds(time, dt, t) }
     }
 
-    /// Sub-steps may become so short, or so many, that the end is out of reach.
+    /// Whether nothing changes, and nothing will.
+    fn is_still(&mut self, time: f64, t: &[f64]) -> Result<bool> {
+        if !self.heat.is_autonomous() {
+            return Ok(false);
+        }
+        let mut rate = memory::filled("rate", t.len(), 0.0)?;
+        self.heat.rate(time, t, &mut rate)?;
+        Ok(sum::max(self.pool, rate.len(), |i| rate[i].abs()) <= 0.0)
+    }
+
+    /// Whether one schedule serves all sub-steps.
+    fn is_fixed(&self) -> bool {
+        self.heat.operator_is_fixed() && self.heat.is_autonomous()
+    }
+
+    /// Sub-steps may become so short, or so many, that the end is out of reach. How many are ahead says little: those
+    /// after a steep beginning are longer.
     fn refuse_what_does_not_end(&self, pace: &Adaptive, (dt, rest): (f64, f64), applications: u64) -> Result<()> {
-        let (allowed, part) = (self.choices.options.max_applications, pace.next(rest));
-        let ahead = if rest > 0.0 { rest / part } else { 0.0 };
-        match pace.failure() {
-            Some(failure) if ahead > allowed as f64 => Err(failure.clone()),
-            _ if applications > allowed || part < f64::EPSILON * rest => {
-                Err(Error::StepTooLarge { dt, needed: applications.saturating_add(ahead as u64), allowed })
+        let (allowed, part) = (self.choices.options.max_applications, pace.next(rest, f64::INFINITY));
+        if rest == 0.0 || (applications <= allowed && part >= f64::EPSILON * rest) {
+            return Ok(());
+        }
+        Err(match pace.failure() {
+            Some(failure) => self.of_host(failure.clone()),
+            None => {
+                // As many again for what is left, or one for each sub-step where nothing is done yet.
+                let needed = (applications as f64 * dt / (dt - rest)).min(applications as f64 + rest / part);
+                Error::StepTooLarge { dt, needed, allowed, remedy: self.remedy().into() }
             }
-            _ => Ok(()),
+        })
+    }
+
+    /// What to do about a step that takes too many applications.
+    fn remedy(&self) -> &'static str {
+        match self.choices.method.is_implicit() || !self.choices.operator.dissipative {
+            true => "ask for less by a larger tolerance",
+            false => self.choices.method.remedy(),
+        }
+    }
+
+    /// An error of the integrator, which knows particles by their internal number.
+    fn of_host(&self, error: Error) -> Error {
+        match error {
+            Error::OutOfBounds { index, value, .. } if !value.is_finite() => {
+                Error::NotFinite { what: "T".into(), index: self.heat.host[index] as usize, value }
+            }
+            Error::OutOfBounds { index, value, low, high, promise } => {
+                Error::OutOfBounds { index: self.heat.host[index] as usize, value, low, high, promise }
+            }
+            other => other,
         }
     }
 
     /// The longest sub-step of a stabilised method in which T changes, at the present rate, by no more than `change`
-    /// times its spread at the beginning. Stability allows more, but then one sub-step of second order would have to
-    /// follow a decay by several factors of e, and modes that it cannot resolve would ring instead of dying (the
-    /// practical step limit of Caplan et al. 2024 has the same purpose). Never below what three stages can do, less
-    /// some rounding that would ask for five.
-    fn practical_limit(&mut self, time: f64, t: &[f64], bounds: Bounds, reference: f64) -> Result<f64> {
-        let (method, options) = (self.choices.method, &self.choices.options);
-        if !method.is_stabilised() || options.stages.is_some() || self.choices.change.is_infinite() {
+    /// times `reference`, its spread at the beginning or how far it has come since. Stability allows more, but then one
+    /// sub-step of second order would have to follow a decay by several factors of e, and modes that it cannot resolve
+    /// would ring instead of dying (the practical step limit of Caplan et al. 2024 has the same purpose). Where a
+    /// tolerance decides, errors are estimated instead.
+    fn practical_limit(&mut self, time: f64, t: &[f64], reference: f64) -> Result<f64> {
+        let Choices { method, options, change, tolerance, .. } = self.choices;
+        if !method.is_stabilised() || options.stages.is_some() || change.is_infinite() || tolerance.is_some() {
             return Ok(f64::INFINITY);
         }
         let mut rate = memory::filled("rate", t.len(), 0.0)?;
         self.heat.rate(time, t, &mut rate)?;
-        let speed = self.norm(|i| rate[i]);
-        let least = method.limit(bounds) * (1.0 - 4.0 * f64::EPSILON);
-        Ok((self.choices.change * reference / speed).max(least))
+        // What a function of the host's heats may relax as a whole; all else moves the mean at a steady pace.
+        let speed = match self.heat.is_autonomous() {
+            true => self.norm(|i| rate[i]),
+            false => sum::rms(self.pool, t.len(), |i| self.heat.volume[i], |i| rate[i]),
+        };
+        let most = change * reference / speed;
+        Ok(if most > 0.0 { most } else { f64::INFINITY })
+    }
+
+    /// How fast T rises by all that is no exchange between particles, root mean square.
+    fn heat_from_outside(&mut self, time: f64, t: &[f64]) -> Result<f64> {
+        let rate = self.heat.from_outside(time, t)?;
+        Ok(sum::rms(self.pool, rate.len(), |i| self.heat.volume[i], |i| rate[i]))
     }
 
     /// The spread of a quantity over the volume.
@@ -205,7 +290,7 @@ impl Motion<'_> {
 
     fn schedule(&self, dt: f64, bounds: Bounds) -> Result<(&'static Method, Schedule)> {
         let (method, options) = (self.choices.method, &self.choices.options);
-        if self.plan.leaves_out("one_stage") && options.stages.is_none() && dt <= explicit_limit(bounds) {
+        if self.plan.leaves_out(&rules::ONE_STAGE) && options.stages.is_none() && dt <= explicit_limit(bounds) {
             let euler = integrator::find("euler")?;
             return Ok((euler, euler.schedule(dt, bounds, options)?));
         }
@@ -216,8 +301,10 @@ impl Motion<'_> {
     pub fn bounds(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
         let start = Instant::now();
         let known = self.known_or_proven(time, t)?;
-        let enough = self.plan.leaves_out("proven_bound") && self.is_least_work(dt, known.bounds);
-        let bounds = if enough { known.bounds } else { self.refined(known, t)? };
+        let cooling = self.fastest_cooling(time, t)?;
+        let enough = self.plan.leaves_out(&rules::PROVEN_BOUND) && self.is_least_work(dt, known, cooling);
+        let bounds = if enough { known.proven } else { self.refined(known, time, t)? };
+        let bounds = raised(bounds, cooling);
         self.timers.add("bound", start.elapsed());
         Ok(bounds)
     }
@@ -225,25 +312,38 @@ impl Motion<'_> {
     /// The best bounds there are: Gershgorin's, lowered by power iteration.
     pub fn refined_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
         let known = self.known_or_proven(time, t)?;
-        self.refined(known, t)
+        let bounds = self.refined(known, time, t)?;
+        self.with_cooling(bounds, time, t)
     }
 
-    fn refined(&mut self, known: Known, t: &[f64]) -> Result<Bounds> {
-        if known.refined {
-            return Ok(known.bounds);
+    /// Bounds with what a source of the host's adds to them, which is looked at anew each time.
+    pub fn with_cooling(&mut self, bounds: Bounds, time: f64, t: &[f64]) -> Result<Bounds> {
+        Ok(raised(bounds, self.fastest_cooling(time, t)?))
+    }
+
+    fn fastest_cooling(&mut self, time: f64, t: &[f64]) -> Result<f64> {
+        let cooling = self.heat.cooling(time, t)?;
+        Ok(sum::max(self.pool, cooling.len(), |i| cooling[i]).max(0.0))
+    }
+
+    fn refined(&mut self, known: Known, time: f64, t: &[f64]) -> Result<Bounds> {
+        if let Some(bounds) = known.refined {
+            return Ok(bounds);
         }
-        let bounds = self.refine(known.bounds, t)?;
-        self.remember(Known { bounds, refined: true });
+        let bounds = self.refine(known, time, t)?;
+        self.remember(Known { refined: Some(bounds), ..known });
         Ok(bounds)
     }
 
-    /// The largest eigenvalue is at least the largest diagonal element: a bound that asks for no more work than that
-    /// need not be refined.
-    fn is_least_work(&self, dt: f64, bounds: Bounds) -> bool {
-        let (method, options) = (self.choices.method, &self.choices.options);
-        let least = method.schedule(dt, Bounds { spectral: bounds.diagonal, ..bounds }, options);
-        let applications = |s: Result<Schedule>| s.map_or(u64::MAX, |s| s.applications());
-        applications(method.schedule(dt, bounds, options)) <= applications(least)
+    /// Whether the proven bound asks for the very sub-steps that the least possible one asks for, and with it every
+    /// bound between them.
+    fn is_least_work(&self, dt: f64, known: Known, cooling: f64) -> bool {
+        let least = Bounds { spectral: known.floor, ..known.proven };
+        let steps = |bounds| {
+            let scheduled = self.schedule(dt, raised(bounds, cooling)).ok();
+            scheduled.map(|(method, s)| (method.name, s.substeps, s.stages))
+        };
+        steps(known.proven).is_some_and(|proven| steps(least) == Some(proven))
     }
 
     /// The best bounds that cost no more than one application: for a report, or a choice between methods.
@@ -251,32 +351,32 @@ impl Motion<'_> {
         if let Some(known) = self.known.filter(|_| self.heat.operator_is_fixed()) {
             return Ok(known);
         }
-        let known = Known { bounds: self.proven_bounds(time, t)?, refined: false };
-        if !self.plan.leaves_out("decays") && self.heat.operator_is_fixed() {
-            self.refuse_growing_modes(t)?;
+        let known = self.proven(time, t)?;
+        if !self.plan.leaves_out(&rules::DECAYS) && self.heat.has_spectrum() {
+            self.refuse_growing_modes(time, t)?;
         }
         self.remember(known);
         Ok(known)
     }
 
     /// The fastest growth of a mode of the operator, and its largest rate, 1/s.
-    pub fn growth(&mut self, t: &[f64]) -> Result<(f64, f64)> {
-        let weight = self.linearise_about(t)?;
+    pub fn growth(&mut self, time: f64, t: &[f64]) -> Result<(f64, f64)> {
+        let weight = self.linearise_about(time, t)?;
         arnoldi::rightmost(self.pool, &weight, |x, y| self.heat.linear(x, y))
     }
 
     /// Makes the operator linear about T; answers the capacities, in whose norm it is symmetric if it is at all.
-    fn linearise_about(&mut self, t: &[f64]) -> Result<Vec<f64>> {
-        self.heat.linearise_surface(t)?;
+    fn linearise_about(&mut self, time: f64, t: &[f64]) -> Result<Vec<f64>> {
+        self.heat.linearise_losses(time, t)?;
         memory::collected("capacities", self.heat.inverse_capacity.iter().map(|&i| heat::capacity(i)))
     }
 
     /// An operator whose modes grow is of no use, however small the step.
-    fn refuse_growing_modes(&mut self, t: &[f64]) -> Result<()> {
+    fn refuse_growing_modes(&mut self, time: f64, t: &[f64]) -> Result<()> {
         let start = Instant::now();
-        let (growth, fastest) = self.growth(t)?;
+        let (growth, fastest) = self.growth(time, t)?;
         self.timers.add("spectrum", start.elapsed());
-        if growth <= GROWS * fastest {
+        if growth <= GROWS * fastest || self.choices.allow.unstable {
             return Ok(());
         }
         let operator = self.choices.operator.name;
@@ -295,24 +395,28 @@ impl Motion<'_> {
     }
 
     /// Gershgorin's bounds: proven, for any operator and any kappa.
-    fn proven_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
+    pub fn proven(&mut self, time: f64, t: &[f64]) -> Result<Known> {
+        let start = Instant::now();
         let circles = self.heat.circles(time, t)?;
         let largest = |of: fn(&(f64, f64)) -> f64| sum::max(self.pool, circles.len(), |i| of(&circles[i])).max(0.0);
-        let bounds = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
-        match bounds.spectral.is_finite() {
-            true => Ok(bounds),
+        let proven = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
+        // An eigenvalue of a symmetric operator is at least the largest diagonal element; of others nothing is known.
+        let floor = if self.choices.operator.dissipative { largest(|c| c.1) } else { 0.0 };
+        self.timers.add("circles", start.elapsed());
+        match proven.spectral.is_finite() {
+            true => Ok(Known { proven, refined: None, floor }),
             false => Err(Error::bad("kappa", "too large", "its product with the pair weights exceeds all numbers")),
         }
     }
 
     /// The same, lowered by power iteration. Exchange with the surroundings is linearised.
-    fn refine(&mut self, proven: Bounds, t: &[f64]) -> Result<Bounds> {
+    fn refine(&mut self, Known { proven, floor, .. }: Known, time: f64, t: &[f64]) -> Result<Bounds> {
         if proven.spectral == 0.0 {
             return Ok(proven);
         }
-        let weight = self.linearise_about(t)?;
+        let weight = self.linearise_about(time, t)?;
         let spectral = spectrum::largest(self.pool, &weight, proven.spectral, |x, y| self.heat.linear(x, y))?;
-        Ok(Bounds { spectral, ..proven })
+        Ok(Bounds { spectral: spectral.max(floor), ..proven })
     }
 
     fn tell(&mut self, time: f64, dt: f64, done: f64) -> Result<()> {

@@ -3,8 +3,9 @@
 
 use super::motion::Motion;
 use super::state::{Directions, Geometry, Input, State, Weights};
-use super::{Choices, Plan};
+use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
+use crate::integrator::Range;
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Slot};
 use crate::model::heat::{Conductivity, Heat, Release};
@@ -12,7 +13,8 @@ use crate::model::surface::{Exchange, Surface};
 use crate::model::tensor::Tensor;
 use crate::operator::table::{self, OPERATORS, Tensor as Form};
 use crate::operator::twice::Recipe;
-use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, tensor};
+use crate::operator::walls::Walls;
+use crate::operator::{Assembly, Matrix, Multigrid, Normalise, Pairs, Sym, Twice, bypass, tensor};
 use crate::space::{Cloud, density, rows::Rows};
 use std::borrow::Cow;
 
@@ -32,6 +34,7 @@ impl State {
     pub fn plan(&mut self) -> Result<Plan> {
         self.prepare_geometry("plan")?;
         self.prepare_directions("plan")?;
+        self.look_for_thin_layers()?;
         Ok(Plan::new(&self.choices, &self.facts()))
     }
 
@@ -114,12 +117,12 @@ impl State {
             // h is not known before the search that finds it: sort on the finest grid, find h, sort again.
             let h = self.find_lengths(call)?;
             self.inputs[fields::H] = Input::Each(h);
-            let made = self.make_geometry(call);
+            let made = self.make_geometry(call, true);
             self.inputs[fields::H] = Input::Unset;
             self.geometry = Some(made?);
             self.timers.add("density", start.elapsed());
         } else {
-            self.geometry = Some(self.make_geometry(call)?);
+            self.geometry = Some(self.make_geometry(call, false)?);
             self.timers.add("sort", start.elapsed());
         }
         Ok(())
@@ -141,7 +144,8 @@ impl State {
         Ok(h)
     }
 
-    fn make_geometry(&mut self, call: &str) -> Result<Geometry> {
+    /// `found`: h was found together with rho, and tells it.
+    fn make_geometry(&mut self, call: &str, found: bool) -> Result<Geometry> {
         let (nu, radius) = (self.dim() as f64, self.choices.kernel.radius());
         let mut h = self.lengths(nu)?;
         let reach = radius * h.iter().copied().fold(0.0, f64::max);
@@ -153,6 +157,10 @@ impl State {
         let cloud = self.cloud(call)?;
         let rows = Rows::new(cloud, &h, radius, &self.pool)?;
         let rho = match &self.inputs[fields::RHO] {
+            Input::Unset if found => {
+                let rho = |(m, h): (&f64, &f64)| m * (self.choices.h_fac / h).powf(nu);
+                memory::collected("rho", m.iter().zip(&h).map(rho))?
+            }
             Input::Unset => density::sum(&self.choices.kernel, &rows, &m, &self.pool)?,
             _ => self.each(fields::RHO)?,
         };
@@ -208,7 +216,7 @@ impl State {
 
     /// Shapes of isotropic particles, where `without=isotropic` asks for them; else empty.
     fn unit_shape(&self) -> Result<Vec<Sym>> {
-        let wanted = self.choices.without("isotropic");
+        let wanted = self.choices.without(&rules::ISOTROPIC);
         memory::filled("shapes", if wanted { self.len() } else { 0 }, tensor::unit(self.dim()))
     }
 
@@ -226,19 +234,37 @@ impl State {
         self.with_motion(&plan, |motion| memory::copied("kappa", motion.heat.kappa_of_t(time, &t)?))
     }
 
+    /// Counts the particles that pairs of better conductors reach over.
+    fn look_for_thin_layers(&mut self) -> Result<()> {
+        if self.bypassed.is_some() {
+            return Ok(());
+        }
+        self.bypassed = Some(match self.kappa() {
+            Input::Each(kappa) if !self.kappa_of_t() => {
+                self.with_rows(|rows| bypass::count(rows, |i| kappa[i], &self.pool))?
+            }
+            _ => (0, 0),
+        });
+        Ok(())
+    }
+
     fn prepare_weights(&mut self, plan: &Plan) -> Result<()> {
         if self.weights.is_some() {
             return Ok(());
         }
         self.refuse_what_does_not_fit()?;
         let start = std::time::Instant::now();
-        let (matrix, normals, made) = self.with_assembly(plan.leaves_out("same_h"), |a| {
-            let (mut matrix, normals) = a.store(&self.pool)?;
-            let made = std::time::Instant::now();
-            a.normalise(&mut matrix, &normals, &self.pool)?;
-            Ok((matrix, normals, made))
+        let same_h = plan.leaves_out(&rules::SAME_H);
+        let (matrix, moments, defect, made) = self.with_assembly(same_h, |a| {
+            let (mut matrix, mut normals) = a.store(&self.pool)?;
+            let (made, moments) = (std::time::Instant::now(), memory::copied("second moments", &normals.moments)?);
+            if a.normalise != Normalise::No {
+                self.at_walls(|walls| walls.complete_normals(a, &matrix, &mut normals))?;
+                a.normalise(&mut matrix, &normals, &self.pool)?;
+            }
+            self.at_walls(|walls| walls.complete(&mut matrix))?;
+            Ok((matrix, moments, normals.defect, made))
         })?;
-        let (moments, defect) = (normals.moments, normals.defect);
         self.timers.add("weights", made - start);
         self.timers.add("normalise", made.elapsed());
         if let (Some(i), Some(cloud)) = (matrix.first_bad(&self.pool), &self.cloud) {
@@ -285,10 +311,21 @@ impl State {
         Err(Error::bad_at("K_d2", host, format!("{median:.3e}"), &rule))
     }
 
+    /// Calls `work` where some particles are walls.
+    fn at_walls(&self, work: impl FnOnce(&Walls<&(dyn Fn(usize) -> bool + Sync + Send)>) -> Result<()>) -> Result<()> {
+        if !self.has_walls() {
+            return Ok(());
+        }
+        let (fixed, pool) = (&self.inputs[fields::FIXED], &self.pool);
+        let fixed = |i: usize| fixed.at(i).is_some_and(|f| f != 0.0);
+        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
+        self.with_rows(|rows| work(&Walls { rows, volume, fixed: &fixed, pool }))
+    }
+
     /// What an operator of two sweeps holds beside the weights of pairs.
     fn make_twice(&mut self, plan: &Plan, limited: bool) -> Result<Twice> {
         let start = std::time::Instant::now();
-        let (mass, same_h, choices) = (self.each(fields::M)?, plan.leaves_out("same_h"), &self.choices);
+        let (mass, same_h, choices) = (self.each(fields::M)?, plan.leaves_out(&rules::SAME_H), &self.choices);
         let low = match limited {
             true => Some(self.monotone_weights(same_h)?),
             false => None,
@@ -303,12 +340,8 @@ impl State {
     /// The operator `monotone` on these particles, whatever the one that was chosen.
     fn monotone_weights(&self, same_h: bool) -> Result<Matrix> {
         let operator = table::find("monotone")?;
-        self.with_assembly(same_h, |a| {
-            let a = Assembly { operator, normalise: operator.normalise, ..*a };
-            let (mut matrix, normals) = a.store(&self.pool)?;
-            a.normalise(&mut matrix, &normals, &self.pool)?;
-            Ok(matrix)
-        })
+        let fitted = |a: &Assembly| Assembly { operator, normalise: operator.normalise, ..*a }.store(&self.pool);
+        Ok(self.with_assembly(same_h, fitted)?.0)
     }
 
     /// 1/(Omega rho)
@@ -331,9 +364,9 @@ impl State {
     }
 
     fn fold_kappa(&mut self, plan: &Plan) -> Result<()> {
-        let fold = plan.leaves_out("frozen") && !plan.leaves_out("uniform_kappa");
+        let fold = plan.leaves_out(&rules::FROZEN) && !plan.leaves_out(&rules::UNIFORM_KAPPA);
         let kappa = if fold { self.each_kappa()? } else { Vec::new() };
-        let (pool, mean) = (&self.pool, self.choices.mean);
+        let (mean, pool) = (self.mean(), &self.pool);
         if let Some(weights) = self.weights.as_mut().filter(|w| fold && !w.folded) {
             let kappa = &kappa[..];
             self.timers.time("fold", || weights.matrix.scale(pool, move |a, b| mean.of(kappa[a], kappa[b])));
@@ -356,10 +389,10 @@ impl State {
     }
 
     fn prepare_surface(&mut self, plan: &Plan) -> Result<()> {
-        if plan.leaves_out("no_wall") {
+        if plan.leaves_out(&rules::NO_WALL) {
             self.surface = None;
         }
-        if plan.leaves_out("no_wall") || self.surface.is_some() {
+        if plan.leaves_out(&rules::NO_WALL) || self.surface.is_some() {
             return Ok(());
         }
         let value = |slot: Slot, i: usize| self.inputs[slot].at(i).unwrap_or(0.0);
@@ -369,14 +402,27 @@ impl State {
                 return Err(Error::bad_at(FIELDS[slot].name, self.host(i), value(slot, i), rule));
             }
         }
+        let flows = |i: usize| {
+            [fields::FLUX_IN, fields::H_CONV, fields::EMISSIVITY].into_iter().any(|slot| value(slot, i) != 0.0)
+        };
+        let areas = self.areas(flows)?;
+        if let Some(i) = (0..self.len()).find(|&i| flows(i))
+            && areas.iter().all(|&area| area == 0.0)
+        {
+            let rule = "no particle that exchanges heat with the outside faces it: exchange at a surface, or give area";
+            return Err(Error::bad_at("area", self.host(i), 0.0, rule));
+        }
+        let kappa = |i: usize| self.kappa().at(i).unwrap_or(0.0);
         let exchange = |i: usize| Exchange {
-            area: self.area(i),
+            area: areas[i],
+            depth: self.depth(i),
             flux_in: value(fields::FLUX_IN, i),
             h_conv: value(fields::H_CONV, i),
             emissivity: value(fields::EMISSIVITY, i),
             t_ambient: value(fields::T_AMBIENT, i),
         };
-        self.surface = Some(Surface::new(self.len(), self.sigma_sb, self.choices.without("no_wall"), exchange)?);
+        let every = self.choices.without(&rules::NO_WALL);
+        self.surface = Some(Surface::new(self.len(), self.sigma_sb, every, kappa, exchange)?);
         Ok(())
     }
 
@@ -384,8 +430,8 @@ impl State {
     pub fn with_motion<T>(&mut self, plan: &Plan, work: impl FnOnce(&mut Motion) -> Result<T>) -> Result<T> {
         let n = self.len();
         let units = self.unit_shape()?;
-        let stiff = self.preconditioning().stiff;
-        let uniform = plan.leaves_out("uniform_kappa");
+        let (stiff, mean) = (self.preconditioning().stiff, self.mean());
+        let uniform = plan.leaves_out(&rules::UNIFORM_KAPPA);
         let mut evaluated = memory::filled("kappa", if self.kappa_of_t() { n } else { 0 }, 0.0)?;
         let mut released = memory::filled("source", if self.source_host.is_some() { n } else { 0 }, 0.0)?;
         let (Some(g), Some(cloud), Some(inverse_capacity)) = (&self.geometry, &self.cloud, &self.inverse_capacity)
@@ -397,7 +443,7 @@ impl State {
         let by_pair = !uniform && self.law.is_none() && self.kappa_host.is_none() && !folded;
         let kappa_given = self.directions.as_ref().map_or(&self.inputs[fields::KAPPA], |d| &d.kappa);
         let kappa = kappa_given.view(if by_pair { n } else { 0 })?;
-        let source = each(fields::SOURCE, !plan.leaves_out("no_source"))?;
+        let source = each(fields::SOURCE, !plan.leaves_out(&rules::NO_SOURCE))?;
         let conductivity = match (&mut self.kappa_host, &self.law, kappa_given) {
             (Some(host), ..) => Conductivity::Host(host, &mut evaluated),
             (None, Some(law), _) => Conductivity::Law(law, &mut evaluated),
@@ -407,7 +453,7 @@ impl State {
         };
         let release = match &mut self.source_host {
             Some(host) => Release::Host(host, &mut released),
-            None if plan.leaves_out("no_source") => Release::None,
+            None if plan.leaves_out(&rules::NO_SOURCE) => Release::None,
             None => Release::Field(&source),
         };
         let (rows, assembly);
@@ -416,7 +462,7 @@ impl State {
             Some(weights) => Pairs::Stored(&weights.matrix),
             None => {
                 rows = Rows::new(cloud, &g.h, self.choices.kernel.radius(), &self.pool)?;
-                let (same_h, shape) = (plan.leaves_out("same_h"), shape_of(&self.directions, &units));
+                let (same_h, shape) = (plan.leaves_out(&rules::SAME_H), shape_of(&self.directions, &units));
                 assembly = assembly_of(&self.choices, &rows, &g.volume, same_h, shape);
                 Pairs::Fresh(&assembly)
             }
@@ -424,21 +470,22 @@ impl State {
         let mut heat = Heat {
             pool: &self.pool,
             pairs,
-            mean: self.choices.mean,
+            mean,
             inverse_capacity,
             conductivity,
             surface: self.surface.as_ref(),
             release,
             volume: &g.volume,
             host: &cloud.host,
-            quiet: plan.leaves_out("quiet_rows"),
+            quiet: plan.leaves_out(&rules::QUIET_ROWS),
             cancel: &self.cancel,
             slopes: Vec::new(),
+            parts: &mut self.parts,
             multigrid: Some(&mut self.multigrid),
             stiff,
             applications: 0,
         };
-        if !(plan.leaves_out("keep_matrix") && heat.operator_is_fixed()) {
+        if !(plan.leaves_out(&rules::KEEP_MATRIX) && heat.operator_is_fixed()) {
             heat.multigrid.iter_mut().for_each(|m| **m = Multigrid::default());
         }
         let mut motion = Motion {
@@ -450,6 +497,7 @@ impl State {
             progress: &mut self.progress,
             timers: &mut self.timers,
             known: &mut self.bounds,
+            range: Range::FINITE,
         };
         let result = work(&mut motion);
         self.applications += motion.heat.applications;

@@ -28,10 +28,10 @@ pub struct Report {
     pub iterations: u64,
 }
 
-/// Seconds per pass, summed over the life of a solver.
+/// Seconds per pass and how often it ran, summed over the life of a solver.
 #[derive(Debug, Clone, Default)]
 pub struct Timers {
-    list: Vec<(&'static str, Duration)>,
+    list: Vec<(&'static str, Duration, u64)>,
 }
 
 impl Timers {
@@ -44,14 +44,19 @@ impl Timers {
     }
 
     pub fn add(&mut self, pass: &'static str, spent: Duration) {
-        match self.list.iter_mut().find(|(name, _)| *name == pass) {
-            Some((_, total)) => *total += spent,
-            None => self.list.push((pass, spent)),
+        match self.list.iter_mut().find(|(name, ..)| *name == pass) {
+            Some((_, total, runs)) => (*total, *runs) = (*total + spent, *runs + 1),
+            None => self.list.push((pass, spent, 1)),
         }
     }
 
     /// Passes in the order in which they first ran, with seconds.
     pub fn seconds(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.list.iter().map(|(name, spent)| (*name, spent.as_secs_f64()))
+        self.list.iter().map(|(name, spent, _)| (*name, spent.as_secs_f64()))
+    }
+
+    /// How often a pass ran.
+    pub fn runs(&self, pass: &str) -> u64 {
+        self.list.iter().find(|(name, ..)| *name == pass).map_or(0, |(.., runs)| *runs)
     }
 }

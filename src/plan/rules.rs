@@ -31,93 +31,108 @@ pub struct Rule {
     pub holds: fn(&Facts) -> bool,
 }
 
-pub static RULES: &[Rule] = &[
-    Rule {
+/// Makes a constant of each rule, and the table of all: a rule exists once, and code names it by its constant.
+macro_rules! table {
+    ($($constant:ident = $rule:expr;)*) => {
+        $(pub static $constant: Rule = $rule;)*
+
+        /// Every rule, in the order in which the plan prints them.
+        pub static RULES: &[&Rule] = &[$(&$constant),*];
+    };
+}
+
+table! {
+    AT_REST = Rule {
         name: "at_rest",
         reason: "the particles do not move: no sort, no pairs, no weights after the first step",
         same: Same::Bits,
         holds: |f| !f.moves,
-    },
-    Rule {
+    };
+    SAME_H = Rule {
         name: "same_h",
         reason: "every h is the same: one kernel evaluation per pair, no symmetrisation",
         same: Same::Bits,
         holds: |f| f.same_h,
-    },
-    Rule {
+    };
+    UNIFORM_KAPPA = Rule {
         name: "uniform_kappa",
         reason: "kappa is one number: one factor instead of an average for each pair",
         same: Same::Rounding,
         holds: |f| f.uniform_kappa,
-    },
-    Rule {
+    };
+    ISOTROPIC = Rule {
         name: "isotropic",
         reason: "kappa is the same in all directions: no angular factor, no tensor in the fluxes",
         same: Same::Rounding,
         holds: |f| !f.tensor,
-    },
-    Rule {
+    };
+    FROZEN = Rule {
         name: "frozen",
         reason: "kappa does not change: its averages are folded into the weights",
         same: Same::Bits,
         holds: |f| !f.uniform_kappa && !f.kappa_of_t && !f.kappa_changes && !f.twice,
-    },
-    Rule {
+    };
+    NO_WALL = Rule {
         name: "no_wall",
         reason: "nothing flows through a surface: insulation is the natural boundary",
         same: Same::Bits,
         holds: |f| f.exchanging == 0,
-    },
-    Rule { name: "no_source", reason: "nothing is heated from inside", same: Same::Bits, holds: |f| !f.heated },
-    Rule {
+    };
+    NO_SOURCE = Rule {
+        name: "no_source",
+        reason: "nothing is heated from inside",
+        same: Same::Bits,
+        holds: |f| !f.heated,
+    };
+    QUIET_ROWS = Rule {
         name: "quiet_rows",
         reason: "blocks of particles whose T and whose neighbours' T are all equal contribute exactly zero",
         same: Same::Bits,
         holds: |f| f.n > crate::pool::BLOCK && !f.twice,
-    },
-    Rule {
+    };
+    ONE_STAGE = Rule {
         name: "one_stage",
         reason: "an rkl1 step below the explicit limit is one Euler stage, of the same order",
         same: Same::Order,
-        holds: |f| f.integrator == "rkl1",
-    },
-    Rule {
+        holds: |f| f.integrator == "rkl1" && !f.controlled,
+    };
+    PROVEN_BOUND = Rule {
         name: "proven_bound",
-        reason: "where Gershgorin's bound asks for no more stages than any bound would, no power iteration",
+        reason: "where Gershgorin's bound asks for the same sub-steps as any lower one could, no power iteration",
         same: Same::Bits,
         holds: |f| !f.implicit,
-    },
-    Rule {
+    };
+    KEEP_MATRIX = Rule {
         name: "keep_matrix",
         reason: "the conductivity does not depend on T: the levels of multigrid are kept, whatever dt is",
         same: Same::Bits,
         holds: |f| f.implicit && f.preconditioning.stiff.is_finite() && !f.kappa_of_t,
-    },
-    Rule {
+    };
+    RATE_ONLY = Rule {
         name: "rate_only",
         reason: "only rates are asked for: no bound on the operator, no stages, no check",
         same: Same::Bits,
         holds: |f| f.rate_only,
-    },
-    Rule {
+    };
+    USED_ONCE = Rule {
         name: "used_once",
         reason: "weights that serve one rate of moving particles are applied as they are made, and not stored",
         same: Same::Bits,
-        holds: |f| f.rate_only && f.moves && !f.normalised && !f.twice && !f.joined,
-    },
-    Rule {
+        holds: |f| f.rate_only && f.moves && !f.normalised && !f.twice && !f.joined && !f.walls,
+    };
+    DECAYS = Rule {
         name: "decays",
-        reason: "weights are the same from both sides of a pair, or growth was allowed: no check of the spectrum",
+        reason: "no mode of the operator can grow, or growth was allowed: no check of the spectrum",
         same: Same::Bits,
-        holds: |f| !f.one_sided,
-    },
-    Rule {
+        holds: |f| !f.may_grow,
+    };
+    POSITIVE = Rule {
         name: "positive",
         reason: "no pair weight is negative, so T cannot grow: no check of its norm",
         same: Same::Bits,
         holds: |f| f.positive,
-    },
-];
+    };
+}
 
 impl PartialEq for Rule {
     fn eq(&self, other: &Rule) -> bool {

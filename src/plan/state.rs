@@ -1,22 +1,23 @@
 //! Everything that a solver holds: what the host handed over, and what was derived from it, each derived thing present
 //! or absent. A setter drops what it invalidates; `prepare` makes what is missing.
 
+use super::choices::Promise;
 use super::motion::Known;
 use super::preconditioner::Preconditioning;
 use super::report::Timers;
-use super::{Choices, Facts};
+use super::{Choices, Facts, rules};
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::integrator::Work;
+use crate::integrator::{Range, Work};
 use crate::memory;
 use crate::model::conductivity::Law;
 use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
 use crate::model::heat::Callback;
 use crate::model::surface::Surface;
 use crate::operator::table::Tensor;
-use crate::operator::{Matrix, Multigrid, Normalise, Sym, Twice};
+use crate::operator::{Matrix, Mean, Multigrid, Normalise, Sym, Twice};
 use crate::pool::Pool;
-use crate::space::{Cloud, Domain};
+use crate::space::{Cloud, Domain, facing};
 use std::borrow::Cow;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -134,10 +135,18 @@ pub struct State {
     pub geometry: Option<Geometry>,
     /// The smoothing lengths found last, in the host's order: where particles move a little, the next are near.
     pub last_h: Vec<f64>,
+    /// For which reach positions were sorted when they were set.
+    first_reach: f64,
     pub weights: Option<Weights>,
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
     pub bounds: Option<Known>,
+    /// Particles beside ones that conduct much better, and those of them that pairs reach over.
+    pub bypassed: Option<(usize, usize)>,
+    /// Between what temperatures the host has set T, until it sets something else; none before a step.
+    pub span: Option<Range>,
+    /// Which particles exchange with which; none where nobody has asked.
+    pub parts: Option<Vec<u32>>,
     /// The preconditioner of implicit steps; empty where it is not needed or was not yet.
     pub multigrid: Multigrid,
 
@@ -171,10 +180,14 @@ impl State {
             directions: None,
             geometry: None,
             last_h: Vec::new(),
+            first_reach: 0.0,
             weights: None,
             inverse_capacity: None,
             surface: None,
             bounds: None,
+            bypassed: None,
+            span: None,
+            parts: None,
             multigrid: Multigrid::default(),
             made: Made::default(),
             steps: 0,
@@ -216,6 +229,7 @@ impl State {
             self.domain = old;
             return moved;
         }
+        self.first_reach = 0.0;
         self.drop_geometry();
         Ok(())
     }
@@ -228,6 +242,7 @@ impl State {
         let reach = self.reach(x);
         let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
         self.place(cloud)?;
+        self.first_reach = reach;
         self.drop_geometry();
         Ok(())
     }
@@ -299,7 +314,7 @@ impl State {
         if fields::TENSOR.contains(&slot) {
             self.inputs[fields::KAPPA] = Input::Unset;
         }
-        self.inputs[slot] = input;
+        (self.inputs[slot], self.span) = (input, None);
         if [fields::T, fields::M, fields::C_V].contains(&slot) {
             self.made = Made::default();
         }
@@ -309,9 +324,18 @@ impl State {
             slot if slot == fields::KAPPA || fields::TENSOR.contains(&slot) => self.drop_directions(),
             fields::C_V | fields::FIXED => {
                 self.inverse_capacity = None;
+                if slot == fields::FIXED {
+                    // Exchanges with walls are in the weights.
+                    self.weights = None;
+                }
                 self.forget_operator();
             }
-            fields::FLUX_IN | fields::H_CONV | fields::EMISSIVITY | fields::T_AMBIENT | fields::AREA => {
+            fields::FLUX_IN
+            | fields::H_CONV
+            | fields::EMISSIVITY
+            | fields::T_AMBIENT
+            | fields::AREA
+            | fields::DEPTH => {
                 self.surface = None;
                 self.forget_operator();
             }
@@ -325,21 +349,32 @@ impl State {
         self.forget_geometry();
     }
 
-    /// Makes the next step build everything anew.
-    pub fn forget_geometry(&mut self) {
+    fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
-        self.surface = None;
+        (self.surface, self.bypassed) = (None, None);
         self.forget_operator();
+    }
+
+    /// What a step of particles that never moved does again where `without=at_rest` asks for it: sorts, and makes all that
+    /// follows, as if the same positions had just been set.
+    pub fn set_anew(&mut self) -> Result<()> {
+        if self.choices.without(&rules::AT_REST) && !self.moves && self.steps + self.rates > 0 {
+            self.sort_again(self.first_reach)?;
+            self.last_h.clear();
+            self.forget_geometry();
+        }
+        Ok(())
     }
 
     /// Makes the next step look at the operator anew.
     fn forget_operator(&mut self) {
-        (self.bounds, self.multigrid) = (None, Multigrid::default());
+        (self.bounds, self.parts, self.multigrid) = (None, None, Multigrid::default());
     }
 
     /// The conductivity changed.
     pub fn drop_kappa(&mut self) {
         self.kappa_changes |= self.steps + self.rates > 0;
+        (self.surface, self.bypassed) = (None, None);
         self.forget_operator();
         if self.weights.as_ref().is_some_and(|w| w.folded) {
             self.weights = None;
@@ -374,16 +409,42 @@ impl State {
         self.forget_operator();
     }
 
-    /// The area of a particle that faces outside: as given, or one face of a cube of its volume. Needs the geometry.
-    pub fn area(&self, i: usize) -> f64 {
-        let nu = self.dim() as f64;
-        let face = || self.geometry.as_ref().map_or(0.0, |g| g.volume[i].powf((nu - 1.0) / nu));
-        self.inputs[fields::AREA].at(i).unwrap_or_else(face)
+    /// The area of each particle that faces outside: as given, or what its neighbours leave open; the latter only where
+    /// it is wanted. Needs the geometry.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn areas(&self, wanted: impl Fn(usize) -> bool + Sync + Send) -> Result<Vec<f64>> {
+        if self.inputs[fields::AREA] != Input::Unset {
+            return self.each(fields::AREA);
+        }
+        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
+        self.with_rows(|rows| facing::areas(&self.choices.kernel, rows, volume, wanted, &self.pool))
+    }
+
+    /// How deep a particle's centre lies below its area: as given, or half a spacing. Needs the geometry.
+    pub fn depth(&self, i: usize) -> f64 {
+        let half = || self.geometry.as_ref().map_or(0.0, |g| 0.5 * g.volume[i].powf(1.0 / self.dim() as f64));
+        self.inputs[fields::DEPTH].at(i).unwrap_or_else(half)
+    }
+
+    /// Whether some particles have a fixed T, to which the weights of their neighbours answer.
+    pub fn has_walls(&self) -> bool {
+        let fixed = match &self.inputs[fields::FIXED] {
+            Input::Each(v) => v.iter().any(|&f| f != 0.0),
+            other => !matches!(other, Input::Number(0.0) | Input::Unset),
+        };
+        fixed && self.choices.operator.completes_walls()
     }
 
     /// kappa depends on T.
     pub fn kappa_of_t(&self) -> bool {
         self.law.is_some() || self.kappa_host.is_some()
+    }
+
+    /// Of kappa between two particles.
+    pub fn mean(&self) -> Mean {
+        self.choices.mean(self.kappa_of_t())
     }
 
     /// Whether some particle exchanges heat with the outside.
@@ -415,7 +476,6 @@ impl State {
         // Espanol & Revenga's weights were checked, unless the host insists.
         let turned = matches!(choices.operator.tensor, Tensor::Angular(_)) && !choices.allow.unstable;
         let positive = choices.operator.positive || turned;
-        let strong_stability = choices.method.ssp > 0.0 && choices.options.keep_bounds;
         Facts {
             n: self.len(),
             dim: self.dim(),
@@ -427,6 +487,7 @@ impl State {
             uniform_kappa: !self.kappa_of_t() && matches!(self.kappa(), Input::Number(_)),
             kappa_of_t: self.kappa_of_t(),
             kappa_changes: self.kappa_changes,
+            mean: self.mean(),
             exchanging,
             heated,
             rate_only: self.rates > 0 && self.steps == 0,
@@ -434,13 +495,16 @@ impl State {
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
             twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
             defect: self.weights.as_ref().and_then(|w| w.defect),
-            one_sided: matches!(choices.operator.tensor, Tensor::Consistent) && !choices.allow.unstable,
+            may_grow: !positive && !choices.operator.dissipative && !choices.allow.unstable,
             joined: choices.operator.joins_rows(),
+            walls: self.has_walls(),
+            bypassed: self.bypassed.unwrap_or_default(),
             positive,
-            keeps_bounds: positive && strong_stability && !heated && exchanging == 0,
+            keeps_bounds: choices.bounds == Promise::Kept && self.source_host.is_none(),
             operator: choices.operator.name,
             integrator: choices.method.name,
             auto: choices.auto.as_ref().map(|auto| auto.reason.clone()),
+            controlled: choices.tolerance.is_some(),
             implicit: choices.method.is_implicit(),
             preconditioning: self.preconditioning(),
             buffers: self.work.bytes() as f64 / 8.0 / self.len().max(1) as f64,

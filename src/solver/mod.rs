@@ -240,6 +240,11 @@ impl Solver {
         (self.state.timers.seconds().collect(), self.state.applications)
     }
 
+    /// How often a pass has run so far, by its name in the plan.
+    pub fn runs(&self, pass: &str) -> u64 {
+        self.state.timers.runs(pass)
+    }
+
     /// Forgets the worker threads, which do not exist in a forked child; for a handle that is thrown away there.
     pub fn abandon(self) {
         self.state.pool.abandon();

@@ -84,6 +84,10 @@ impl Solver {
                 sum::rms(&state.pool, defect.len(), |_| 1.0, |i| defect[i])
             }
             "energy_defect" => state.made.share(),
+            "bypassed" => {
+                state.plan()?;
+                state.bypassed.map_or(0.0, |(_, over)| over as f64)
+            }
             "growth_rate" => {
                 let t = temperatures(state)?;
                 state.growth(&t)?
@@ -117,19 +121,17 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
             let found = state.with_assembly(same_h, |a| moments::first(a, stored, &state.pool))?;
             return columns(&found, state.dim());
         }
-        "grad_T" => return gradient_of_t(state),
-        "flux" => {
-            let (mut flux, kappa) = (gradient_of_t(state)?, state.kappa_now()?);
-            turn(state, &mut flux);
-            flux.iter_mut().for_each(|g| g.iter_mut().zip(&kappa).for_each(|(g, k)| *g *= -k));
-            return Ok(flux);
+        "grad_T" => {
+            let t = given(state, fields::T)?;
+            return gradient_of(state, |a, b| t[b] - t[a]);
         }
+        "flux" => return flux(state),
         "b" => return (0..state.dim()).map(|a| given(state, fields::B + a)).collect(),
         "rho" => memory::copied("rho", &geometry(state)?.rho)?,
         "h" => memory::copied("h", &geometry(state)?.h)?,
         "area" => {
             geometry(state)?;
-            memory::collected("area", (0..n).map(|i| state.area(i)))?
+            state.areas(|_| true)?
         }
         "u" => times_c_v(state, given(state, fields::T)?)?,
         "dT_dt" => state.rate()?,
@@ -149,6 +151,10 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
             let m = given(state, fields::M)?;
             geometry(state)?;
             state.with_rows(|rows| density::omega(&state.choices.kernel, rows, &m, &state.pool))?
+        }
+        "depth" => {
+            geometry(state)?;
+            memory::collected("depth", (0..n).map(|i| state.depth(i)))?
         }
         name => given(state, fields::slot(name)?)?,
     };
@@ -188,11 +194,25 @@ fn orders(state: &mut State) -> Result<Vec<f64>> {
     state.with_assembly(same_h, |a| consistent::reached(a, &state.pool))
 }
 
-fn gradient_of_t(state: &mut State) -> Result<Vec<Vec<f64>>> {
-    let t = given(state, fields::T)?;
+/// The gradient, by components, of what rises by `rise(a, b)` from a particle to its neighbour.
+fn gradient_of(state: &mut State, rise: impl Fn(usize, usize) -> f64 + Sync + Send) -> Result<Vec<Vec<f64>>> {
     let volume = memory::copied("volumes", &geometry(state)?.volume)?;
-    let found = state.with_rows(|rows| gradient::of(&t, &state.choices.kernel, rows, &volume, &state.pool))?;
+    let found = state.with_rows(|rows| gradient::of(rise, &state.choices.kernel, rows, &volume, &state.pool))?;
     columns(&found, state.dim())
+}
+
+/// What flows through each particle: the gradient made of kappa_ab (T_b − T_a), with the average of kappa by which the
+/// operator exchanges heat, so that it is the same flux on both sides of a jump of kappa. Times −S where kappa S is a
+/// tensor. Two sweeps average fluxes where pairs average kappa arithmetically.
+fn flux(state: &mut State) -> Result<Vec<Vec<f64>>> {
+    let (t, kappa, mean) = (given(state, fields::T)?, state.kappa_now()?, state.mean());
+    let by_pair = !matches!(state.choices.operator.tensor, Tensor::Twice { .. });
+    let mut flux = gradient_of(state, |a, b| match by_pair {
+        true => mean.of(kappa[a], kappa[b]) * (t[a] - t[b]),
+        false => kappa[a] * mean.share(kappa[a], kappa[b]) * (t[a] - t[b]),
+    })?;
+    turn(state, &mut flux);
+    Ok(flux)
 }
 
 /// Multiplies vectors, given by components, by the shape of each particle's tensor.

@@ -6,6 +6,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, INPUTS};
 use crate::plan::state::{Input, State};
+use crate::space::Domain;
 use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
@@ -58,6 +59,11 @@ impl Solver {
     /// Forgets that an earlier call was cancelled.
     pub fn begin(&mut self) {
         self.state.cancel.store(false, Ordering::Relaxed);
+    }
+
+    /// The box, or open space.
+    pub fn domain(&self) -> &Domain {
+        &self.state.domain
     }
 
     /// Whether kappa was given as a tensor.

@@ -7,6 +7,7 @@ pub mod cells;
 pub mod cloud;
 pub mod density;
 pub mod domain;
+pub mod facing;
 pub mod morton;
 mod nearest;
 pub mod rows;

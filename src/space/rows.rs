@@ -225,7 +225,9 @@ mod tests {
     /// Every pair and image by the definition.
     fn brute_force(cloud: &Cloud, h: &[f64], radius: f64, i: usize) -> Vec<(u32, u64)> {
         let (dim, domain) = (cloud.dim(), &cloud.domain);
-        let images = |a: usize| if a < dim && domain.periodic[a] { -7i64..=7 } else { 0..=0 };
+        let reach = radius * h.iter().copied().fold(0.0, f64::max);
+        let most = |a: usize| (reach / domain.length(a)).ceil() as i64;
+        let images = |a: usize| if a < dim && domain.periodic[a] { -most(a)..=most(a) } else { 0..=0 };
         let mut found = Vec::new();
         for j in 0..cloud.len() {
             for (kx, ky, kz) in images(0).flat_map(|x| images(1).flat_map(move |y| images(2).map(move |z| (x, y, z)))) {

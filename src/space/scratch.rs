@@ -147,7 +147,8 @@ impl Scratch {
         let here = |c: &usize| self.shift.iter().all(|shift| shift.get(*c).is_none_or(|s| *s == 0.0));
         let candidates = self.j.iter().enumerate().filter(|(_, j)| **j as usize == i);
         let found = candidates.map(|(c, _)| c).find(here);
-        let all = |first: &usize| self.j[*first..].iter().zip(i..).take_while(|(j, i)| **j as usize == *i).count() >= count;
+        let all =
+            |first: &usize| self.j[*first..].iter().zip(i..).take_while(|(j, i)| **j as usize == *i).count() >= count;
         let lost = || Error::Panic { reason: format!("particle {i} is not in the cell that was searched for it") };
         found.filter(all).ok_or_else(lost)
     }

@@ -2,7 +2,7 @@
 
 use super::page::Page;
 use super::run::Watch;
-use super::{claims, convergence, kernels, peers, positivity, sod, stability, work};
+use super::{accuracy, claims, convergence, kernels, peers, positivity, sod, stability, work};
 use crate::error::{Error, Result};
 use std::path::PathBuf;
 
@@ -60,6 +60,11 @@ pub static STUDIES: &[Entry] = &[
         name: "stability",
         about: "62 cases that break solvers, for every method where they apply: required, seen, pass or fail",
         run: stability::answer,
+    },
+    Entry {
+        name: "accuracy",
+        about: "errors of a decaying mode for the choices that matter, medians over seeds: the figures of the README",
+        run: |request| answer(accuracy::run(request)?),
     },
     Entry {
         name: "convergence",

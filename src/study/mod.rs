@@ -14,7 +14,7 @@
 //! | `norm` | the error that is meant |
 //! | `recommend` | what reaches an error cheapest on a host's particles |
 //! | `catalogue` | studies of the library itself, by name |
-//! | `kernels`, `convergence`, `work` | studies of accuracy |
+//! | `accuracy`, `kernels`, `convergence`, `work` | studies of accuracy |
 //! | `peers` | other codes, on the same particles in the same run |
 //! | `positivity` | of anisotropic operators |
 //! | `sod` | of a shock tube, with a small hydrodynamics of its own |
@@ -24,6 +24,8 @@
 //! | `page`, `table`, `plot` | what a study found, for people, browsers and programs |
 //! | `stability` | cases that break solvers |
 
+#[cfg(feature = "cli")]
+pub mod accuracy;
 #[cfg(feature = "cli")]
 mod batch;
 #[cfg(feature = "cli")]

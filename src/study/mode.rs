@@ -29,13 +29,20 @@ pub const LINE: Cloud = cloud("line", 1, "cubic", 0.0);
 pub const SQUARE: Cloud = cloud("square", 2, "square", 0.0);
 pub const HEXAGONAL: Cloud = Cloud { cell: (1.7320508075688772, 2), ..cloud("hexagonal", 2, "hexagonal", 0.0) };
 pub const JITTER_2D: Cloud = cloud("2-D 20 % jitter", 2, "square", 0.2);
+pub const STRONG_2D: Cloud = cloud("2-D 40 % jitter", 2, "square", 0.4);
 pub const GLASS_2D: Cloud = Cloud { glass: true, ..cloud("2-D glass", 2, "square", 0.5) };
 pub const CUBIC: Cloud = cloud("cubic", 3, "cubic", 0.0);
 pub const FCC: Cloud = Cloud { cell: (1.0, 4), ..cloud("fcc", 3, "fcc", 0.0) };
 pub const JITTER_3D: Cloud = cloud("3-D 20 % jitter", 3, "cubic", 0.2);
+pub const STRONG_3D: Cloud = cloud("3-D 40 % jitter", 3, "cubic", 0.4);
 pub const GLASS_3D: Cloud = Cloud { glass: true, ..cloud("3-D glass", 3, "cubic", 0.5) };
 
 impl Cloud {
+    /// Whether chance places its particles.
+    pub fn is_disordered(&self) -> bool {
+        self.jitter > 0.0
+    }
+
     /// Some `n` particles per side.
     ///
     /// # Errors
@@ -73,7 +80,16 @@ impl Sample {
     /// # Errors
     /// As [`Cloud::scene`] and of the particles.
     pub fn new(cloud: Cloud, n: usize) -> Result<Sample> {
+        Sample::seeded(cloud, n, 1)
+    }
+
+    /// The same with another disorder for each seed.
+    ///
+    /// # Errors
+    /// As [`Sample::new`].
+    pub fn seeded(cloud: Cloud, n: usize, seed: u64) -> Result<Sample> {
         let mut scene = cloud.scene(n, "")?;
+        scene.particles.seed = seed;
         if cloud.glass {
             let (mut solver, _) = setup(&scene, Path::new(""))?;
             scene.particles.made = Some(Arc::new(solver.get_all("x")?));

@@ -24,16 +24,41 @@ const REACH: f64 = 2.9;
 /// # Errors
 /// `NoMemory`; `BoxTooSmall` where that reaches too many periodic images.
 pub fn free(domain: &Domain, x: &[f64], spacing: &[f64]) -> Result<Vec<bool>> {
+    let mut free = memory::filled("surface", spacing.len(), false)?;
+    near(domain, x, spacing, |row, host, reach| {
+        free[host[row.i] as usize] = one_sidedness(row, reach) > THRESHOLD[domain.dim - 1];
+    })?;
+    Ok(free)
+}
+
+/// The largest ratio of a positive quantity at a particle and at one of those around it; infinite where one of two is 0.
+///
+/// # Errors
+/// As [`free`].
+pub fn jump(domain: &Domain, x: &[f64], spacing: &[f64], values: &[f64]) -> Result<f64> {
+    let mut most = 1.0f64;
+    near(domain, x, spacing, |row, host, reach| {
+        let own = values[host[row.i] as usize];
+        // The next two shells of a lattice.
+        for (&j, _) in row.j.iter().zip(row.r).filter(|(_, r)| **r < 0.6 * reach) {
+            let other = values[host[j as usize] as usize];
+            if own != other {
+                most = most.max(own.max(other) / own.min(other));
+            }
+        }
+    })?;
+    Ok(most)
+}
+
+/// Visits every particle with those around it; the visitor gets host numbers and how far they reach.
+fn near(domain: &Domain, x: &[f64], spacing: &[f64], mut visit: impl FnMut(&Row, &[u32], f64)) -> Result<()> {
     let (n, dim, pool) = (spacing.len(), domain.dim, Pool::new(1)?);
     let most = REACH * spacing.iter().copied().fold(0.0, f64::max);
     let cloud = Cloud::sort(domain, Strided::new("x", x, n, dim, dim)?, most, &pool)?;
     let reach = memory::collected("reach", cloud.host.iter().map(|&host| REACH * spacing[host as usize]))?;
     let rows = Rows::new(&cloud, &reach, 1.0, &pool)?;
-    let mut free = memory::filled("surface", n, false)?;
-    rows.visit(0..n, &mut Scratch::default(), |row| {
-        free[cloud.host[row.i] as usize] = one_sidedness(&row, reach[row.i]) > THRESHOLD[dim - 1];
-    })?;
-    Ok(free)
+    rows.visit(0..n, &mut Scratch::default(), |row| visit(&row, &cloud.host, reach[row.i]))?;
+    Ok(())
 }
 
 /// The length of the mean direction to the neighbours within `reach`; 1 for a particle that has none.

@@ -2,8 +2,8 @@
 //! 2012 for the terms in Omega), for a conductivity that is a tensor.
 //!
 //! ```text
-//! g_a = P_a Σ_b m_b s_ab (T_b − T_a) d_ab,         s_ab = −F(r, h_a)/r,   d_ab = r_b − r_a
-//! E_a = Σ_b d_ab·(m_b s_ab z_a + m_a s_ba z_b) + Σ_b omega_ab R_ab
+//! g_a = P_a Σ_b m_b s_ab f_ab (T_b − T_a) d_ab,    s_ab = −F(r, h_a)/r,   d_ab = r_b − r_a
+//! E_a = Σ_b d_ab·(m_b s_ab f_ab z_a + m_a s_ba f_ba z_b) + Σ_b omega_ab R_ab
 //! z_a = P_aᵀ (V_a kappa_a S_a g_a − ½ Σ_b omega_ab R_ab d_ab)
 //! R_ab = T_b − T_a − ½ (g_a + g_b)·d_ab,           omega_ab = theta nu kappa_ab g_ab
 //! ```
@@ -11,6 +11,9 @@
 //! E_a is the power into particle a: minus the derivative by T_a of Φ = ½ Σ V g·kappa S g + ½ Σ_pairs omega R², so the
 //! operator is symmetric, conservative and never lets T grow, whatever P is. Either P_a = 1/(Omega_a rho_a), as in the
 //! paper, or P_a is the inverse of Σ m_b s_ab d dᵀ, which makes g exact for linear fields (Bonet & Lok 1999). The
+//! f_ab = kappa_ab/kappa_a where kappa_ab is the harmonic mean: across a jump of kappa, T changes mostly on the side that
+//! conducts less, and kappa g is the same flux on both; nothing passes a particle with kappa = 0. With the arithmetic mean
+//! f = 1: what flows between two particles is the mean of their fluxes. A tensor counts by its mean over directions. The
 //! jumps R that the gradients do not explain are what two first derivatives cannot see; theta = 0 leaves them alone.
 
 mod limit;
@@ -62,6 +65,7 @@ pub struct Recipe<'a> {
 struct Exchange {
     a: usize,
     b: usize,
+    /// Times f_ab and f_ba.
     slope: Slope,
     /// Stored coefficient of the weights, V_a V_b w_ab.
     coef: f64,
@@ -115,7 +119,7 @@ impl Twice {
         out: &mut [f64],
         finish: impl Fn(usize, f64) -> f64 + Sync + Send,
     ) -> Result<()> {
-        let g = self.gradients(pool, matrix, t)?;
+        let g = self.gradients(pool, matrix, kappa, t)?;
         let z = self.fluxes(pool, matrix, kappa, t, &g)?;
         let exchange = |e: &Exchange| {
             let through = dot(e.slope.d, z[e.a]) * e.slope.own + dot(e.slope.d, z[e.b]) * e.slope.mate;
@@ -188,13 +192,13 @@ impl Twice {
         diagonal + conducts(a, sum)
     }
 
-    fn gradients(&self, pool: &Pool, matrix: &Matrix, t: &[f64]) -> Result<Vec<Axes<f64>>> {
+    fn gradients(&self, pool: &Pool, matrix: &Matrix, kappa: Kappa, t: &[f64]) -> Result<Vec<Axes<f64>>> {
         let mut g = memory::filled("gradients", t.len(), [0.0; 3])?;
         self.each(pool, &mut g, |a| {
             let mut raw = [0.0; 3];
-            for (slope, &b) in self.slopes(a).iter().zip(matrix.columns(a)) {
-                let rise = slope.own * (t[b as usize] - t[a]);
-                (0..3).for_each(|k| raw[k] += rise * slope.d[k]);
+            for e in self.row(matrix, kappa, a) {
+                let rise = e.slope.own * (t[e.b] - t[a]);
+                (0..3).for_each(|k| raw[k] += rise * e.slope.d[k]);
             }
             times(&self.frame[a], raw)
         });
@@ -231,7 +235,13 @@ impl Twice {
         let pairs = self.slopes(a).iter().zip(matrix.columns(a)).zip(matrix.coefficients(a)).enumerate();
         pairs.map(move |(k, ((&slope, &b), &coef))| {
             let b = b as usize;
-            let mean_kappa = kappa.map_or(1.0, |(mean, kappa)| mean.of(kappa[a], kappa[b]));
+            let (mut slope, mut mean_kappa) = (slope, 1.0);
+            if let Some((mean, kappa)) = kappa {
+                let (here, there) = (kappa[a], kappa[b]);
+                mean_kappa = mean.of(here, there);
+                slope.own *= mean.share(here, there);
+                slope.mate *= mean.share(there, here);
+            }
             Exchange { a, b, slope, coef, low: low.get(k).copied().unwrap_or(0.0), mean_kappa }
         })
     }

@@ -7,7 +7,10 @@
 //! | `steady` | layers, cylinders, spheres; a body without inner resistance |
 //! | `parameters` | what a scene gives a solution, with defaults |
 //! | `numbers` | error function, roots |
+//! | `laws`, `checks` | in tests: the equation, and what every solution is held against; one without a check is refused |
 
+#[cfg(test)]
+mod checks;
 #[cfg(test)]
 mod laws;
 pub mod numbers;

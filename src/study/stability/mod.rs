@@ -78,23 +78,32 @@ pub fn cases() -> Vec<&'static Case> {
 ///
 /// # Errors
 /// Where no threads can be had.
-pub fn run(cases: &[&Case], scale: usize, mut watch: Watch) -> Result<(Vec<Row>, bool)> {
+pub fn run(cases: &[&Case], scale: usize, watch: Watch) -> Result<(Vec<Row>, bool)> {
+    control(cases, scale, 1.0, watch)
+}
+
+/// The same with solvers whose conductivity is `conducts` times what a case asks for: 0 for one that does nothing. What
+/// passes then has criteria that do not see what they are about.
+///
+/// # Errors
+/// As [`run`].
+pub fn control(cases: &[&Case], scale: usize, conducts: f64, mut watch: Watch) -> Result<(Vec<Row>, bool)> {
     let todo: Vec<(&Case, Trial)> =
         cases.iter().flat_map(|case| (case.trials)().into_iter().map(|t| (*case, t))).collect();
-    let row = |(case, trial): &(&Case, Trial)| Ok(Row::new(case, trial, attempt(case, trial, scale)));
+    let row = |(case, trial): &(&Case, Trial)| Ok(Row::new(case, trial, attempt(case, trial, scale, conducts)));
     let rows = batch::map(&todo, row, |done| watch(done as f64 / todo.len() as f64))?;
     let complete = rows.len() == todo.len();
     Ok((rows, complete))
 }
 
 /// What was seen; none where the words are not known yet.
-fn attempt(case: &Case, trial: &Trial, scale: usize) -> Option<Seen> {
+fn attempt(case: &Case, trial: &Trial, scale: usize, conducts: f64) -> Option<Seen> {
     if trial.is_absent() {
         return None;
     }
     let look = |threads: usize| {
         let mut seen = Seen::default();
-        if let Err(e) = (case.check)(&Setting { words: trial.words.clone(), scale, threads }, &mut seen) {
+        if let Err(e) = (case.check)(&Setting { words: trial.words.clone(), scale, threads, conducts }, &mut seen) {
             seen.require(&format!("an answer: {e}"), false);
         }
         seen

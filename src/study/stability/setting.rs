@@ -4,8 +4,10 @@ use super::{Seen, trial};
 use crate::array::Strided;
 use crate::error::Result;
 use crate::integrator::Method;
+use crate::operator::table;
 use crate::solver::Solver;
 use crate::study::lattice;
+use crate::words::replaced;
 
 /// What a case is tried with.
 pub struct Setting {
@@ -14,6 +16,8 @@ pub struct Setting {
     /// Multiplies the number of particles along each axis.
     pub scale: usize,
     pub threads: usize,
+    /// Multiplies conductivities: 1, or something else in a control, whose cases must fail.
+    pub conducts: f64,
 }
 
 /// T inside and outside the hot disc.
@@ -41,8 +45,14 @@ impl Setting {
             s.set_box(&[0.0; 3][..dim], &[1.0; 3][..dim], &[true; 3][..dim])?;
         }
         place(&mut s, x)?;
-        numbers(&mut s, &[("m", dim as f64 / x.len().max(1) as f64), ("rho", 1.0), ("kappa", 1.0)])?;
+        numbers(&mut s, &[("m", dim as f64 / x.len().max(1) as f64), ("rho", 1.0), ("kappa", self.conducts)])?;
         Ok(s)
+    }
+
+    /// To know what is right with the same operator: conducts as it should, in many short steps of an explicit method.
+    pub fn careful(&self) -> Setting {
+        let words = replaced(&self.words, "integrator=ssprk3", &["stages", "tolerance"]);
+        Setting { words, conducts: 1.0, ..*self }
     }
 
     /// The hot disc, 10 : 0.1, on 20 %-jittered particles with unequal heat capacities.
@@ -60,7 +70,9 @@ impl Setting {
 
     /// Whether the words promise the maximum principle.
     pub fn keeps_bounds(&self) -> bool {
-        self.method().is_some_and(|m| m.ssp > 0.0)
+        let named = trial::value(&self.words, "operator").unwrap_or("brookshaw");
+        let able = table::find(named).is_ok_and(|o| o.positive) && !self.words.contains("bounds=free");
+        able || self.method().is_some_and(|m| m.ssp > 0.0)
     }
 
     pub fn is_implicit(&self) -> bool {

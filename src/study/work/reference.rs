@@ -32,6 +32,7 @@ pub enum Reference {
     Same {
         t: Rc<Vec<f64>>,
         error: f64,
+        about: String,
     },
 }
 
@@ -47,18 +48,19 @@ impl Reference {
             None => {
                 let (mut solver, _) = setup(scene, folder)?;
                 let dt = scene.time.end - scene.time.start;
-                let recommend::Reference { t, error } = recommend::Reference::of(&mut solver, dt, EXACT_IN_TIME)?;
-                Ok(Reference::Same { t: Rc::new(t), error })
+                let recommend::Reference { t, error, about } =
+                    recommend::Reference::of(&mut solver, dt, EXACT_IN_TIME)?;
+                Ok(Reference::Same { t: Rc::new(t), error, about: format!("{about} on the same particles") })
             }
         }
     }
 
     /// What it is, and what it may itself be wrong by.
-    pub fn about(&self) -> Option<(&'static str, f64)> {
+    pub fn about(&self) -> Option<(&str, f64)> {
         match self {
             Reference::Exact => None,
             Reference::Finer { error, .. } => Some(("twice the resolution", *error)),
-            Reference::Same { error, .. } => Some(("consistent weights of higher order on the same particles", *error)),
+            Reference::Same { error, about, .. } => Some((about, *error)),
         }
     }
 
@@ -95,7 +97,9 @@ impl Reference {
 fn finer(scene: &Scene, folder: &Path, n: u32) -> Result<Reference> {
     let mut coarse = Study::new(scene.clone(), folder)?;
     let own = format!("integrator=rkl2 tolerance={EXACT_IN_TIME:e}");
-    let consistent = (!has_tensor(scene)).then(|| recommend::exact_words(coarse.dim(), 4, EXACT_IN_TIME));
+    // Weights that are fitted row by row know neither free surfaces nor jumps of kappa, however fine.
+    let fitted = !has_tensor(scene) && recommend::is_smooth(&mut setup(scene, folder)?.0)?;
+    let consistent = fitted.then(|| recommend::exact_words(coarse.dim(), 4, EXACT_IN_TIME));
     let places = coarse.places()?;
     let fields = |words: &str| (0..3).map(|power| level(scene, folder, n, power, words)).collect::<Result<Vec<_>>>();
     // What a scene asks for itself is second best: pairs do not converge on disorder.

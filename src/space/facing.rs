@@ -1,0 +1,137 @@
+//! The area of a particle that faces outside, from where its neighbours are.
+//!
+//! ```text
+//! A_a = V_a^((nu−1)/nu) (|∇ ln S_a| / its value at a flat face)^(3/2),    S = Σ_b V_b W_ab(h_a), the particle itself included
+//! ```
+//!
+//! S falls from 1 inside to 1/2 and less at a surface. Its logarithm adds up over faces at right angles, which therefore
+//! count as their number to the power 3/4 at edges and corners; the exponent 3/2 makes up for that and for layers that are
+//! not parallel to the surface. Measured on squares and cubes along and across the lattice and on discs, 20 and 12
+//! particles wide, jitter 0 to 20 %: the sum over all particles is 0.95 to 1.07 of the area, on a ball 12 wide 1.13; nothing
+//! inside. In a layer as thin as one particle ∇S vanishes, and ln S itself counts the faces.
+
+use super::{Row, rows::Rows};
+use crate::error::Result;
+use crate::kernel::Kernel;
+use crate::memory;
+use crate::pool::Pool;
+
+/// Fewer faces than this are disorder.
+const LEAST: f64 = 0.35;
+/// Where ∇S says so, ln S must say that this many are open for it to be believed.
+const THIN: f64 = 1.5;
+/// Half the width of the lattice that is summed over for a flat face, in spacings: wider supports are not of use.
+const MOST: f64 = 24.0;
+/// h over spacing is rounded to these parts, so that few flat faces need to be looked at.
+const PARTS: f64 = 64.0;
+
+/// ln S and |∇ ln S| times the spacing, of the outermost layer of a lattice with a flat face.
+#[derive(Clone, Copy)]
+pub(super) struct Face {
+    pub log: f64,
+    pub slope: f64,
+}
+
+/// The flat faces met so far, by h over spacing.
+#[derive(Default)]
+pub(super) struct Faces(Vec<(u32, Face)>);
+
+/// Buffers of a worker.
+#[derive(Default)]
+struct Space {
+    q: Vec<f64>,
+    w: Vec<f64>,
+    slope: Vec<f64>,
+    faces: Faces,
+}
+
+/// The areas of all particles for which `wanted`, 0 for the others.
+///
+/// # Errors
+/// `NoMemory`.
+pub fn areas(
+    kernel: &Kernel,
+    rows: &Rows,
+    volume: &[f64],
+    wanted: impl Fn(usize) -> bool + Sync + Send,
+    pool: &Pool,
+) -> Result<Vec<f64>> {
+    let mut area = memory::filled("areas", volume.len(), 0.0)?;
+    rows.map(pool, &mut area, |space: &mut Space, row: Row| {
+        Ok(if wanted(row.i) { space.area(kernel, rows.h[row.i], volume, &row) } else { 0.0 })
+    })?;
+    Ok(area)
+}
+
+impl Space {
+    fn area(&mut self, kernel: &Kernel, h: f64, volume: &[f64], row: &Row) -> f64 {
+        let nu = kernel.dim() as f64;
+        let spacing = volume[row.i].powf(1.0 / nu);
+        self.evaluate(kernel, row.r.iter().map(|r| r / h));
+        // In units of h, so that nothing overflows in any system of units.
+        let share = |j: u32| volume[j as usize] / h.powf(nu);
+        let (mut s, mut gradient) = (share(row.i as u32) * kernel.w_at(0.0), [0.0; 3]);
+        for (k, (w, slope)) in self.w.iter().zip(&self.slope).enumerate() {
+            s += share(row.j[k]) * w;
+            for (g, d) in gradient.iter_mut().zip(row.d).filter(|(_, d)| !d.is_empty()) {
+                *g += share(row.j[k]) * slope * d[k] / h;
+            }
+        }
+        let slope = gradient.iter().map(|g| g * g).sum::<f64>().sqrt() * (spacing / h) / s;
+        let face = self.faces.at(kernel, h / spacing);
+        let (open, thin) = ((slope / face.slope).powf(1.5), s.ln() / face.log);
+        // The ends of a row are whole.
+        let line = kernel.dim() == 1;
+        let faces = if row.is_empty() {
+            2.0 * nu
+        } else if open >= LEAST {
+            if line { 1.0 } else { open }
+        } else if thin >= THIN {
+            if line { 2.0 } else { thin }
+        } else {
+            0.0
+        };
+        spacing.powf(nu - 1.0) * faces
+    }
+
+    fn evaluate(&mut self, kernel: &Kernel, q: impl Iterator<Item = f64>) {
+        self.q.clear();
+        self.q.extend(q);
+        self.w.resize(self.q.len(), 0.0);
+        self.slope.resize(self.q.len(), 0.0);
+        kernel.w(&self.q, &mut self.w);
+        kernel.slope_over_q(&self.q, &mut self.slope);
+    }
+}
+
+impl Faces {
+    /// The flat face for this h over spacing.
+    pub fn at(&mut self, kernel: &Kernel, ratio: f64) -> Face {
+        let part = (ratio * PARTS).round().clamp(1.0, 1e6) as u32;
+        if let Some((_, face)) = self.0.iter().find(|(p, _)| *p == part) {
+            return *face;
+        }
+        let face = Face::of(kernel, f64::from(part) / PARTS);
+        self.0.push((part, face));
+        face
+    }
+}
+
+impl Face {
+    /// Sums over a half lattice of spacing 1; layers from the face inwards.
+    fn of(kernel: &Kernel, h: f64) -> Face {
+        let most = (kernel.radius() * h).min(MOST).floor() as i32;
+        let across = |axis: usize| if axis < kernel.dim() { -most..=most } else { 0..=0 };
+        let (mut s, mut slope, volume) = (0.0, 0.0, h.powi(-(kernel.dim() as i32)));
+        for x in 0..=most {
+            for (y, z) in across(1).flat_map(|y| across(2).map(move |z| (y, z))) {
+                let q = f64::from(x * x + y * y + z * z).sqrt() / h;
+                let mut by_q = [0.0];
+                kernel.slope_over_q(&[q], &mut by_q);
+                s += volume * kernel.w_at(q);
+                slope += volume * by_q[0] * f64::from(x) / h;
+            }
+        }
+        Face { log: s.ln(), slope: (slope / h / s).abs() }
+    }
+}

@@ -1,0 +1,373 @@
+//! Whatever dt a host gives: the error in time is what the words promise, it does not fall when dt grows, T stays between
+//! its bounds, and what cannot be done is refused before minutes of work.
+
+mod particles;
+
+use diffusph::Solver;
+use diffusph::integrator::METHODS;
+use nalgebra::{DMatrix, DVector};
+use particles::*;
+use std::f64::consts::PI;
+
+const SIDE: usize = 14;
+
+/// The solution in time of the operator itself, probed column by column: with equal capacities it is symmetric.
+struct Exact {
+    values: DVector<f64>,
+    vectors: DMatrix<f64>,
+}
+
+impl Exact {
+    fn new(s: &mut Solver) -> Exact {
+        let n = s.len();
+        let mut operator = DMatrix::zeros(n, n);
+        for i in 0..n {
+            let unit: Vec<f64> = (0..n).map(|j| f64::from(i == j)).collect();
+            set(s, "T", &unit);
+            operator.set_column(i, &DVector::from_vec(s.get_all("dT_dt").unwrap()));
+        }
+        let eigen = (0.5 * (&operator + operator.transpose())).symmetric_eigen();
+        Exact { values: eigen.eigenvalues, vectors: eigen.eigenvectors }
+    }
+
+    fn after(&self, t: &[f64], dt: f64) -> Vec<f64> {
+        let mut modes = self.vectors.tr_mul(&DVector::from_column_slice(t));
+        modes.iter_mut().zip(&self.values).for_each(|(m, v)| *m *= (v * dt).exp());
+        (&self.vectors * modes).as_slice().to_vec()
+    }
+}
+
+fn particles() -> Vec<f64> {
+    lattice(SIDE, 2, 0.2)
+}
+
+fn starts(x: &[f64]) -> [(&'static str, Vec<f64>); 4] {
+    let n = x.len() / 2;
+    [
+        ("disc", field(x, 2, |p| if (p[0] - 0.5).hypot(p[1] - 0.5) < 0.2 { 1.0 } else { 0.0 })),
+        ("half", field(x, 2, |p| if p[0] > 0.5 { 1.0 } else { 0.0 })),
+        ("one hot particle", (0..n).map(|i| if i == n / 2 { 1e6 } else { 1.0 }).collect()),
+        ("mode", field(x, 2, |p| 2.0 + (2.0 * PI * p[0]).sin())),
+    ]
+}
+
+fn spread(t: &[f64]) -> f64 {
+    let mean = t.iter().sum::<f64>() / t.len() as f64;
+    (t.iter().map(|t| (t - mean) * (t - mean)).sum::<f64>() / t.len() as f64).sqrt()
+}
+
+/// The error of one step, relative to the spread at the beginning, how far T is outside its bounds, and applications of
+/// the operator.
+fn one_step(words: &str, x: &[f64], exact: &Exact, start: &[f64], limits: f64) -> (f64, f64, u64) {
+    let mut s = unit_box(words, x, 2, true);
+    set(&mut s, "T", start);
+    let dt = limits * s.limit().unwrap();
+    let report = s.step(dt).unwrap_or_else(|e| panic!("{words} {limits}: {e}"));
+    let t = s.get_all("T").unwrap();
+    let off: Vec<f64> = t.iter().zip(exact.after(start, dt)).map(|(a, b)| a - b).collect();
+    let error = (off.iter().map(|v| v * v).sum::<f64>() / off.len() as f64).sqrt() / spread(start);
+    let (low, high) = start.iter().fold((f64::MAX, f64::MIN), |(l, h), &v| (l.min(v), h.max(v)));
+    let outside = t.iter().map(|t| (low - t).max(t - high)).fold(f64::MIN, f64::max);
+    (error, outside, report.applications)
+}
+
+const LIMITS: [f64; 10] = [0.1, 0.5, 1.0, 2.0, 3.0, 10.0, 30.0, 100.0, 1000.0, 1e4];
+
+#[test]
+fn the_error_of_a_step_is_what_was_promised_whatever_dt_is() {
+    let x = particles();
+    let exact = Exact::new(&mut unit_box("", &x, 2, true));
+    // auto and what it may choose answer for 1e-3 in a sub-step; change=0.05 for 5 % of the spread in one.
+    for (words, promise) in
+        [("", 1e-3), ("integrator=sdirk2 tolerance=1e-3", 1e-3), ("integrator=rkl2 tolerance=off", 5e-3)]
+    {
+        for (name, start) in starts(&x) {
+            for limits in LIMITS {
+                let (error, outside, applications) = one_step(words, &x, &exact, &start, limits);
+                println!("{words:35} {name:17} {limits:6}: {error:.1e} with {applications}");
+                assert!(error < promise, "{words} {name} {limits}: {error:e}");
+                assert!(outside <= 0.0, "{words} {name} {limits}: outside by {outside:e}");
+            }
+        }
+    }
+    // What the default was before: one long sub-step, in no bounds. These criteria see it.
+    let old = "integrator=rkl2 tolerance=off change=inf bounds=free";
+    let (disc, spike) = (&starts(&x)[0].1, &starts(&x)[2].1);
+    let (error, outside) = (one_step(old, &x, &exact, disc, 2.0).0, one_step(old, &x, &exact, spike, 2.0).1);
+    assert!(error > 0.05 && outside > 1e3, "{error:e} {outside:e}");
+}
+
+#[test]
+fn every_method_keeps_bounds_and_energy_where_the_operator_can() {
+    let x = particles();
+    let (name, start) = starts(&x)[2].clone();
+    for method in METHODS {
+        for limits in [0.7, 2.5, 40.0, 1e4] {
+            for operator in ["brookshaw", "kernel"] {
+                let mut s =
+                    unit_box(&format!("integrator={} operator={operator} bounds=keep", method.name), &x, 2, true);
+                set(&mut s, "T", &start);
+                let dt = limits * s.limit().unwrap();
+                let report = s.step(dt).unwrap_or_else(|e| panic!("{} {limits}: {e}", method.name));
+                assert!(report.t_min >= 1.0 && report.t_max <= 1e6, "{} {name} {limits}: {report:?}", method.name);
+                let drift = report.energy / report.energy_before - 1.0;
+                assert!(drift.abs() < 1e-12, "{} {limits}: energy {drift:e}", method.name);
+            }
+        }
+    }
+    // Left alone, a long step of second order goes far below.
+    let mut s = unit_box("integrator=sdirk2 bounds=free", &x, 2, true);
+    set(&mut s, "T", &start);
+    let dt = 40.0 * s.limit().unwrap();
+    assert!(s.step(dt).unwrap().t_min < -1e3);
+}
+
+#[test]
+fn bounds_that_cannot_be_kept_are_refused_and_those_left_by_far_are_an_error() {
+    for operator in ["direct", "consistent", "two-first"] {
+        let text = Solver::new(&format!("heat dim=2 operator={operator} bounds=keep")).err().unwrap().to_string();
+        assert!(text.contains("bounds=keep needs an operator that is positive"), "{text}");
+    }
+    let x = particles();
+    let start = starts(&x)[2].1.clone();
+    // Gradients that see nothing of the shortest waves: a hot particle rings, beyond what is watched for.
+    let step = |words: &str| {
+        let mut s = unit_box(&format!("operator=two-first theta=0 {words}"), &x, 2, true);
+        set(&mut s, "T", &start);
+        let dt = 5.0 * s.limit().unwrap();
+        let done = s.step(dt);
+        (done, s.get_all("T").unwrap())
+    };
+    let (error, t) = step("");
+    let error = error.unwrap_err();
+    assert!(error.name() == "OUT_OF_BOUNDS" && error.to_string().contains("two-first misses"), "{error}");
+    assert_eq!(bits(&t), bits(&start));
+    assert!(step("bounds=free").0.unwrap().t_min < 1.0 - 0.1e6);
+}
+
+#[test]
+fn two_bodies_that_exchange_nothing_each_keep_their_energy_while_bounds_are_kept() {
+    // A gap wider than a support, and a layer that insulates.
+    for gap in [true, false] {
+        let x: Vec<f64> = particles()
+            .iter()
+            .enumerate()
+            .map(|(k, x)| if gap && k % 2 == 0 && *x > 0.5 { x + 1.0 } else { *x })
+            .collect();
+        let mut s = unit_box("integrator=rkl2", &x, 2, false);
+        let right = field(&x, 2, |p| f64::from(p[0] > 0.5));
+        if !gap {
+            set(&mut s, "kappa", &field(&x, 2, |p| if (0.35..0.65).contains(&p[0]) { 0.0 } else { 1.0 }));
+        }
+        let hot = field(&x, 2, |p| p[0]).iter().position(|x| *x < 0.2).unwrap();
+        let start: Vec<f64> = (0..right.len()).map(|i| if i == hot + 5 { 1e6 } else { 1.0 + right[i] }).collect();
+        set(&mut s, "T", &start);
+        let dt = 30.0 * s.limit().unwrap();
+        let report = s.step(dt).unwrap();
+        let t = s.get_all("T").unwrap();
+        assert!(report.t_min >= 1.0, "{report:?}");
+        for side in [0.0, 1.0] {
+            let sum = |t: &[f64]| t.iter().zip(&right).filter(|(_, r)| **r == side).map(|(t, _)| t).sum::<f64>();
+            assert!((sum(&t) / sum(&start) - 1.0).abs() < 1e-12, "gap {gap}, side {side}: {} {}", sum(&t), sum(&start));
+        }
+    }
+}
+
+#[test]
+fn growth_is_refused_whatever_else_the_scene_has() {
+    let x = lattice(20, 2, 0.2);
+    let scene = |words: &str, set_up: fn(&mut Solver, &[f64])| {
+        let mut s = unit_box(&format!("operator=direct kernel=M4 h_fac=1.5 {words}"), &x, 2, true);
+        set(&mut s, "T", &field(&x, 2, |p| 300.0 + f64::from(p[0] < 0.05)));
+        set_up(&mut s, &x);
+        s.step(1.0).map(|report| (report.t_min, report.t_max))
+    };
+    let set_ups: [fn(&mut Solver, &[f64]); 4] = [
+        |_, _| (),
+        |s, x| set(s, "fixed", &field(x, 2, |p| f64::from(p[0] < 0.05))),
+        |s, _| s.set_number("source", 1.0).unwrap(),
+        |s, _| s.set_number("h_conv", 1.0).unwrap(),
+    ];
+    for set_up in set_ups {
+        let error = scene("", set_up).unwrap_err().to_string();
+        assert!(error.contains("a mode that grows"), "{error}");
+    }
+    // Who insists gets what is watched.
+    let error = scene("allow=unstable", set_ups[1]).unwrap_err();
+    assert!(["OUT_OF_BOUNDS", "NOT_FINITE"].contains(&error.name()), "{error}");
+}
+
+#[test]
+fn a_source_that_depends_on_t_is_followed() {
+    let x = lattice(6, 2, 0.0);
+    let follow = |words: &str, rate: f64| {
+        let mut s = unit_box(words, &x, 2, true);
+        s.set_number("T", 1.0).unwrap();
+        s.set_source_callback(Some(Box::new(move |_, _, t, source| {
+            source.iter_mut().zip(t).for_each(|(s, t)| *s = -rate * (t - 2.0));
+            0
+        })));
+        s.step(1.0).map(|r| (r.t_min, r.t_max))
+    };
+    for rate in [1.0f64, 10.0, 1e3, 1e6] {
+        let exact = 2.0 - (-rate).exp();
+        // A million sub-steps of an explicit method teach nothing new.
+        for method in METHODS.iter().filter(|m| rate < 1e6 || m.is_implicit()) {
+            let (low, high) = follow(&format!("integrator={} tolerance=1e-4", method.name), rate).unwrap();
+            assert!((low - exact).abs() < 0.02 && (high - exact).abs() < 0.02, "{} {rate}: {low} {high}", method.name);
+            // Without one, a single implicit step is what it is (Crank-Nicolson's turns what is stiff round): nothing
+            // blows up.
+            let (low, high) = follow(&format!("integrator={} tolerance=off", method.name), rate).unwrap();
+            let most = if method.name == "crank-nicolson" { 1.01 } else { 0.3 };
+            assert!((low - exact).abs() < most && (high - exact).abs() < most, "{} {rate}: {low} {high}", method.name);
+        }
+        let (low, high) = follow("", rate).unwrap();
+        assert!((low - exact).abs() < 2e-3 && (high - exact).abs() < 2e-3, "{rate}: {low} {high}");
+    }
+    // One that feeds on T grows as it should.
+    let (low, high) = follow("", -3.0).unwrap();
+    let exact = 2.0 - 3f64.exp();
+    assert!((low / exact - 1.0).abs() < 5e-3 && low == high, "{low} {exact}");
+}
+
+#[test]
+fn a_value_that_is_not_finite_in_any_call_of_the_source_is_never_done() {
+    let x = lattice(8, 2, 0.2);
+    for words in ["", "integrator=rkl2", "integrator=rk4", "integrator=ssprk2 tolerance=1e-6", "integrator=sdirk2"] {
+        let step = |bad: usize| {
+            let calls = std::sync::Arc::new(std::sync::atomic::AtomicUsize::new(0));
+            let count = calls.clone();
+            let mut s = unit_box(words, &x, 2, true);
+            set(&mut s, "T", &field(&x, 2, |p| 2.0 + p[0]));
+            s.set_source_callback(Some(Box::new(move |_, _, t, source| {
+                source.iter_mut().zip(t).for_each(|(s, t)| *s = 0.1 * t);
+                if count.fetch_add(1, std::sync::atomic::Ordering::Relaxed) == bad {
+                    source[3] = f64::NAN;
+                }
+                0
+            })));
+            let done = s.step(5e-3).map(drop);
+            (done, calls.load(std::sync::atomic::Ordering::Relaxed))
+        };
+        let (done, calls) = step(usize::MAX);
+        done.unwrap();
+        for bad in (0..calls).step_by(calls / 20 + 1) {
+            let error = step(bad).0.unwrap_err().to_string();
+            assert!(
+                error.contains("source callback") && error.contains("NaN at particle"),
+                "{words} call {bad} of {calls}: {error}"
+            );
+        }
+    }
+}
+
+#[test]
+fn where_nothing_changes_a_step_is_one() {
+    let x = particles();
+    let mut s = unit_box("max_applications=1000", &x, 2, true);
+    s.set_number("T", 300.0).unwrap();
+    for words in names("integrators").iter().map(|m| format!("integrator={m}")).chain([String::new()]) {
+        let mut s = unit_box(&words, &x, 2, true);
+        s.set_number("T", 300.0).unwrap();
+        let limit = s.limit().unwrap();
+        for dt in [20.0 * limit, 1e4, 1e300] {
+            let report = s.step(dt).unwrap_or_else(|e| panic!("{words} {dt:e}: {e}"));
+            assert_eq!((report.substeps, report.t_min, report.t_max), (1, 300.0, 300.0), "{words} {dt:e}");
+        }
+    }
+    // In equilibrium with what surrounds it.
+    s.set_number("h_conv", 3.0).unwrap();
+    s.set_number("T_ambient", 300.0).unwrap();
+    assert_eq!(s.step(1e6).unwrap().substeps, 1);
+    // A last digit of noise, heated as a whole, costs little more than the heating.
+    let mut s = unit_box("", &x, 2, true);
+    let mut random = Random(3);
+    let noise: Vec<f64> = (0..s.len()).map(|_| 300.0 + 1e-9 * random.next()).collect();
+    set(&mut s, "T", &noise);
+    let dt = 1e4 * s.limit().unwrap();
+    s.set_number("source", 1.0 / dt).unwrap();
+    let report = s.step(dt).unwrap();
+    assert!(report.substeps < 150 && (report.t_max - 301.0).abs() < 1e-6, "{report:?}");
+}
+
+#[test]
+fn what_a_step_may_cost_is_kept() {
+    let x = particles();
+    for words in names("integrators").iter().map(|m| format!("integrator={m}")).chain([String::new()]) {
+        for dt in [1e-2, 1e4, 1e300] {
+            let mut s = unit_box(&format!("{words} max_applications=300"), &x, 2, true);
+            let start = starts(&x)[0].1.clone();
+            set(&mut s, "T", &start);
+            match s.step(dt) {
+                Ok(report) => assert!(report.applications < 600, "{words} {dt:e}: {report:?}"),
+                Err(e) => {
+                    assert!(["STEP_TOO_LARGE", "NOT_CONVERGED", "OUT_OF_BOUNDS"].contains(&e.name()), "{words}: {e}");
+                    assert!(!e.to_string().contains("18446744073709551615"), "{e}");
+                    if e.name() == "STEP_TOO_LARGE" {
+                        assert!(e.to_string().contains(&format!("step of {dt:e}")), "{words} {dt:e}: {e}");
+                    }
+                    assert_eq!(bits(&s.get_all("T").unwrap()), bits(&start), "{words} {dt:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_stiff_half_costs_no_more_than_the_root_of_its_contrast() {
+    let x = particles();
+    let applications = |contrast: f64| {
+        let mut s = unit_box("", &x, 2, true);
+        set(&mut s, "T", &field(&x, 2, |p| 1.0 + p[0]));
+        set(&mut s, "kappa", &field(&x, 2, |p| if p[0] < 0.5 { 1.0 } else { contrast }));
+        s.step(0.01).unwrap().applications as f64
+    };
+    let base = applications(1.0);
+    for contrast in [1e2, 1e4, 1e6, 1e8] {
+        let cost = applications(contrast);
+        println!("{contrast:e}: {cost} of {base}");
+        assert!(cost < 2.0 * base * contrast.sqrt(), "{contrast:e}: {cost} of {base}");
+        assert!(cost < 2e4, "{contrast:e}: {cost}");
+    }
+}
+
+#[test]
+fn radiation_does_not_cool_below_all_surroundings() {
+    let (n, side) = (12, 0.02);
+    let x: Vec<f64> = lattice(n, 2, 0.0).iter().map(|x| side * x).collect();
+    let d = side / n as f64;
+    let edge = field(&x, 2, |p| f64::from(p.iter().any(|c| *c < d || *c > side - d)));
+    for words in ["", "integrator=sdirk2", "integrator=crank-nicolson", "integrator=backward-euler", "integrator=rkl2"]
+    {
+        for (hot, dt) in [(1800.0, 60.0), (3000.0, 3600.0), (3000.0, 86400.0)] {
+            if words.ends_with("rkl2") && dt > 60.0 {
+                continue;
+            }
+            let mut s = Solver::new(&format!("heat dim=2 kernel=C2 {words}")).unwrap();
+            s.set_particles(diffusph::Strided::new("x", &x, n * n, 2, 2).unwrap()).unwrap();
+            let numbers = [("m", 7800.0 * d * d), ("rho", 7800.0), ("T", hot), ("kappa", 30.0), ("c_v", 460.0)];
+            numbers.iter().for_each(|(name, value)| s.set_number(name, *value).unwrap());
+            set(&mut s, "emissivity", &edge.iter().map(|e| 0.8 * e).collect::<Vec<_>>());
+            set(&mut s, "area", &edge.iter().map(|e| d * e).collect::<Vec<_>>());
+            s.set_number("T_ambient", 300.0).unwrap();
+            let report = s.step(dt).unwrap_or_else(|e| panic!("{words} {hot} {dt}: {e}"));
+            assert!(report.t_min >= 300.0 && report.t_max < hot, "{words} {hot} {dt}: {report:?}");
+        }
+    }
+}
+
+#[test]
+fn a_body_that_radiates_alone_follows_its_equation() {
+    // dT/dt = -rate T^4 from 1: T = (1 + 3 rate t)^(-1/3).
+    let x = lattice(4, 2, 0.0);
+    for rate in [1.0, 1e3, 1e6] {
+        for (words, tolerance) in [("", 5e-3), ("integrator=sdirk2 tolerance=1e-5", 1e-3)] {
+            let mut s = unit_box(words, &x, 2, true);
+            let numbers = [("T", 1.0), ("emissivity", 1.0), ("area", 1.0 / 16.0), ("sigma_SB", rate)];
+            numbers.iter().for_each(|(name, value)| s.set_number(name, *value).unwrap());
+            let t = s.step(1.0).unwrap_or_else(|e| panic!("{words} {rate}: {e}")).t_min;
+            let exact = (1.0 + 3.0 * rate).powf(-1.0 / 3.0);
+            assert!((t / exact - 1.0).abs() < tolerance, "{words} {rate}: {t} {exact}");
+        }
+    }
+}
