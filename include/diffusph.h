@@ -347,8 +347,8 @@ int32_t diffusph_set_box(struct diffusph_solver *s,
 
 /**
  * Positions, and with them, where given, masses, densities and smoothing lengths. The same number of particles as
- * before moves them, and they keep everything else; another number starts anew, and what was given per particle must be
- * given again. Nothing is copied twice: a host's own layout is described by `stride`, so x[n][3] has 3, and
+ * before moves them, and they keep everything else; where the number changes, what was given per particle must be given
+ * again, or as one number: until then, calls that need it answer OUT_OF_ORDER and name it. Nothing is copied twice: a host's own layout is described by `stride`, so x[n][3] has 3, and
  * xyzh(4,n) of Fortran has 4.
  *
  * \param n      particles
@@ -370,7 +370,7 @@ int32_t diffusph_set_particles(struct diffusph_solver *s,
 
 /**
  * A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. "x" moves
- * the particles; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
+ * the particles; "u" sets T, which from then on follows where c_v is set; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
  * xy; xx, yy, zz, xy, yz, xz).
  *
  * \param name   which
@@ -412,8 +412,8 @@ int32_t diffusph_set_law(struct diffusph_solver *s,
 int32_t diffusph_set_kappa_callback(struct diffusph_solver *s, diffusph_field_callback callback, void *user);
 
 /**
- * Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away. It is called
- * for every stage, with `user`.
+ * Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away, and so does
+ * setting "source". It is called for every stage, with `user`.
  */
 int32_t diffusph_set_source_callback(struct diffusph_solver *s,
                                      diffusph_field_callback callback,
@@ -555,18 +555,20 @@ int32_t diffusph_seconds(struct diffusph_solver *s,
 
 /**
  * Writes the particles and their quantities, with the time: a .vtu, or a legacy .vtk if the name ends so. The file
- * appears whole or not at all.
+ * appears whole or not at all. A .vtu holds all that decides how the solver goes on, except functions of the host; a legacy
+ * file is for other tools and has no place for it.
  *
- * Errors: IO, OUT_OF_ORDER before T, m and kappa are set.
+ * Errors: BAD_VALUE for another ending, IO, OUT_OF_ORDER before T, m and kappa are set.
  */
 int32_t diffusph_write_vtk(struct diffusph_solver *s,
                            const char *path);
 
 /**
  * Writes the next snapshot of a series and lists it: for "run.pvd", the files run_0000.vtu, run_0001.vtu and so on
- * beside it. Snapshots listed at this time or later are replaced, so that a restarted run goes on where it stands.
+ * beside it. Snapshots listed at this time or later are replaced, so that a restarted run goes on where it stands; no file
+ * that an earlier entry lists is touched.
  *
- * \param pvd_path the list, for ParaView
+ * \param pvd_path the list, for ParaView; it ends in .pvd
  *
  * Errors: as diffusph_write_vtk; BAD_FILE when the list is none.
  */
@@ -574,10 +576,14 @@ int32_t diffusph_write_series(struct diffusph_solver *s,
                               const char *pvd_path);
 
 /**
- * Takes particles from a VTK file (.vtu, .vtp, .pvtu, .pvtp, legacy .vtk): positions, every array with the name of a
- * quantity that can be set, and the time if there is one.
+ * Takes particles from a VTK file (.vtu, .vtp, .pvtu, .pvtp, legacy .vtk). A snapshot of diffusph_write_vtk takes the place
+ * of all that was set before (particles, quantities, numbers, laws, box and time), and the solver goes on from it to the bit
+ * as the one that wrote it, if its words are the same; functions that were lent must be lent before. Of the file of another
+ * program, positions are taken, every array with the name of a quantity that can be set, and the time if there is one.
+ * In one and two dimensions particles may lie along any axes of the file, and are written along the same.
  *
- * Errors: IO, BAD_FILE, BAD_VALUE naming the first bad element; nothing is changed then.
+ * Errors: IO, BAD_FILE, BAD_VALUE naming the first bad element, or where the particles fill more dimensions than the solver
+ * has; OUT_OF_ORDER naming a function that the snapshot needs; nothing is changed then.
  */
 int32_t diffusph_read_vtk(struct diffusph_solver *s,
                           const char *path);

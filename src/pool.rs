@@ -24,20 +24,42 @@ unsafe impl<T: Send> Sync for Guarded<T> {}
 pub struct Pool {
     threads: usize,
     workers: Option<rayon::ThreadPool>,
-    handles: Arc<Mutex<Vec<JoinHandle<()>>>>,
+    handles: Handles,
 }
 
+type Handles = Arc<Mutex<Vec<JoinHandle<()>>>>;
+
 impl Pool {
-    /// `threads` workers; 0 means as many as this process may use (affinity and cgroups count). One thread makes no
-    /// worker at all: the caller's thread does the work.
+    /// `threads` workers; 0 means as many as this process may use (affinity and cgroups count) and the system starts. One
+    /// thread makes no worker at all: the caller's thread does the work.
+    ///
+    /// # Errors
+    /// `BadValue` where the system starts fewer than were asked for.
     pub fn new(threads: usize) -> Result<Pool> {
-        let threads = match threads {
+        Pool::starting(threads, spawn_workers)
+    }
+
+    fn starting(threads: usize, spawn: impl Fn(usize, &Handles) -> Result<rayon::ThreadPool>) -> Result<Pool> {
+        let mut count = match threads {
             0 => std::thread::available_parallelism().map_or(1, |n| n.get()),
             n => n,
         };
-        let handles = Arc::new(Mutex::new(Vec::new()));
-        let workers = if threads > 1 { Some(spawn_workers(threads, &handles)?) } else { None };
-        Ok(Pool { threads, workers, handles })
+        loop {
+            let handles = Handles::default();
+            if count <= 1 {
+                return Ok(Pool { threads: 1, workers: None, handles });
+            }
+            match spawn(count, &handles) {
+                Ok(workers) => return Ok(Pool { threads: count, workers: Some(workers), handles }),
+                Err(e) => {
+                    let started = join(&handles);
+                    if threads > 0 {
+                        return Err(e);
+                    }
+                    count = started.min(count - 1);
+                }
+            }
+        }
     }
 
     pub fn threads(&self) -> usize {
@@ -118,14 +140,17 @@ impl Drop for Pool {
     fn drop(&mut self) {
         // Dropping rayon's pool only tells its threads to stop; a host that unloads the library needs them gone.
         self.workers = None;
-        let handles = self.handles.lock().map(|mut h| std::mem::take(&mut *h)).unwrap_or_default();
-        for handle in handles {
-            let _ = handle.join();
-        }
+        join(&self.handles);
     }
 }
 
-fn spawn_workers(threads: usize, handles: &Arc<Mutex<Vec<JoinHandle<()>>>>) -> Result<rayon::ThreadPool> {
+/// Waits for workers that have been told to stop; how many there were.
+fn join(handles: &Handles) -> usize {
+    let handles = handles.lock().map(|mut h| std::mem::take(&mut *h)).unwrap_or_default();
+    handles.into_iter().map(JoinHandle::join).count()
+}
+
+fn spawn_workers(threads: usize, handles: &Handles) -> Result<rayon::ThreadPool> {
     let kept = Arc::clone(handles);
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
@@ -138,7 +163,7 @@ fn spawn_workers(threads: usize, handles: &Arc<Mutex<Vec<JoinHandle<()>>>>) -> R
             Ok(())
         })
         .build()
-        .map_err(|e| Error::bad("threads", threads, &format!("the system would not start them: {e}")))
+        .map_err(|e| Error::bad("threads", threads, &format!("the system would not start them ({e}); ask for fewer")))
 }
 
 #[cfg(test)]
@@ -154,6 +179,27 @@ mod tests {
             pool.chunks(&mut data, BLOCK, |start, part| part.iter_mut().enumerate().for_each(|(i, x)| *x = start + i));
             assert!(data.iter().enumerate().all(|(i, &x)| i == x));
         }
+    }
+
+    #[test]
+    fn without_a_number_fewer_threads_will_do() {
+        let at_most = |most: usize| {
+            move |count: usize, handles: &Handles| match count <= most {
+                true => spawn_workers(count, handles),
+                false => {
+                    // As many as start; they end at once.
+                    (0..most).for_each(|_| handles.lock().unwrap().push(std::thread::spawn(|| ())));
+                    Err(Error::bad("threads", count, "too many"))
+                }
+            }
+        };
+        let usable = std::thread::available_parallelism().map_or(1, |n| n.get());
+        for most in [0, 1, 2] {
+            let pool = Pool::starting(0, at_most(most)).unwrap();
+            assert_eq!(pool.threads(), most.clamp(1, usable));
+            assert_eq!(pool.map(9, |i| i), (0..9).collect::<Vec<_>>());
+        }
+        assert!(Pool::starting(3, at_most(2)).is_err() && Pool::starting(2, at_most(2)).is_ok());
     }
 
     #[test]

@@ -97,6 +97,18 @@ fn little_work(h: &mut Host) {
     *h = Host::ready("heat dim=2 threads=1 integrator=euler max_applications=3");
 }
 
+fn fewer(h: &mut Host) {
+    assert_eq!(unsafe { diffusph_set_particles(h.s, LEN - 1, h.x.as_ptr(), 2, null(), null(), null()) }, 0);
+}
+
+fn flat(h: &mut Host) {
+    empty(h);
+    h.x.iter_mut().skip(1).step_by(2).for_each(|y| *y = 0.5);
+    let m = [1.0; N];
+    assert_eq!(unsafe { diffusph_set_particles(h.s, LEN, h.x.as_ptr(), 2, m.as_ptr(), null(), null()) }, 0);
+    assert_eq!(unsafe { diffusph_set_number(h.s, c("T"), 1.0) + diffusph_set_number(h.s, c("kappa"), 1.0) }, 0);
+}
+
 fn tiny_box(h: &mut Host) {
     let (lo, hi) = ([0.0, 0.0], [1e-3, 1.0]);
     assert_eq!(unsafe { diffusph_set_number(h.s, c("h"), 0.1) }, 0);
@@ -113,6 +125,7 @@ const TABLE: &[Row] = &[
     Row("diffusph_create", as_is, |h| unsafe { diffusph_create(c("heat"), null_mut(), h.why.as_mut_ptr(), 256) }, -1, "s is NULL"),
     Row("diffusph_create", as_is, |h| unsafe { diffusph_create(c("heet"), &mut h.made, h.why.as_mut_ptr(), 256) }, -5, "did you mean 'heat'"),
     Row("diffusph_create", as_is, |h| unsafe { diffusph_create(c("heat dim=4"), &mut h.made, h.why.as_mut_ptr(), 256) }, -2, "dim is '4'"),
+    Row("diffusph_create", as_is, |h| unsafe { diffusph_create(c("heat integrator=euler stages=5"), &mut h.made, h.why.as_mut_ptr(), 256) }, -2, "stages is 5; it has no effect here"),
     Row("diffusph_create", as_is, |h| unsafe { diffusph_create(c("heat dim=4"), &mut h.made, null_mut(), 256) }, -2, ""),
     Row("diffusph_create", as_is, |h| unsafe { diffusph_create(c("heat dim=4"), &mut h.made, h.why.as_mut_ptr(), -1) }, -2, ""),
     Row("diffusph_create", as_is, |h| unsafe { diffusph_create(c"heat \xff=1".as_ptr(), &mut h.made, h.why.as_mut_ptr(), 256) }, -2, "must be UTF-8"),
@@ -158,6 +171,8 @@ const TABLE: &[Row] = &[
 
     Row("diffusph_set_number", as_is, |h| unsafe { diffusph_set_number(h.s, null(), 1.0) }, -1, "name is NULL"),
     Row("diffusph_set_number", as_is, |h| unsafe { diffusph_set_number(h.s, c("m"), 0.0) }, -2, "m is 0"),
+    Row("diffusph_set_number", as_is, |h| unsafe { diffusph_set_number(h.s, c("emissivity"), 1.5) }, -2, "from 0 to 1"),
+    Row("diffusph_set_number", as_is, |h| unsafe { diffusph_set_number(h.s, c("u"), NAN) }, -2, "u is NaN"),
     Row("diffusph_set_number", as_is, |h| unsafe { diffusph_set_number(h.s, c("time"), INF) }, -2, "time is inf"),
     Row("diffusph_set_number", as_is, |h| unsafe { diffusph_set_number(h.s, c("energy"), 1.0) }, -2, "'energy'"),
     Row("diffusph_set_number", as_is, |h| unsafe { diffusph_set_number(h.s, c("tim"), 1.0) }, -5, "'tim'"),
@@ -178,6 +193,8 @@ const TABLE: &[Row] = &[
     Row("diffusph_step", stopping, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, 5, "cancelled"),
     Row("diffusph_step", kappa_42, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, 7, "kappa callback returned 42"),
     Row("diffusph_step", kappa_nan, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, -2, "is NaN (at T = "),
+    Row("diffusph_step", fewer, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, -4, "T (or u), m for the 24 particles"),
+    Row("diffusph_step", flat, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, -2, "flat along y"),
     Row("diffusph_step", tiny_box, |h| unsafe { diffusph_step(h.s, 1e-3, &mut h.report) }, -6, "on axis 0"),
     Row("diffusph_recommend", as_is, |h| unsafe { diffusph_recommend(h.s, NAN, 1e-3, h.text.as_mut_ptr(), 256, &mut h.value, &mut h.seconds) }, -2, "wanted is NaN"),
     Row("diffusph_recommend", as_is, |h| unsafe { diffusph_recommend(h.s, 0.1, 0.0, h.text.as_mut_ptr(), 256, &mut h.value, &mut h.seconds) }, -2, "dt is 0"),
@@ -220,11 +237,13 @@ const TABLE: &[Row] = &[
     Row("diffusph_seconds", as_is, |h| unsafe { diffusph_seconds(h.s, 0, h.text.as_mut_ptr(), 256, null_mut()) }, -1, "seconds is NULL"),
 
     Row("diffusph_write_vtk", as_is, |h| unsafe { diffusph_write_vtk(h.s, null()) }, -1, "path is NULL"),
-    Row("diffusph_write_vtk", as_is, |h| unsafe { diffusph_write_vtk(h.s, c("")) }, -7, "cannot write"),
-    Row("diffusph_write_vtk", as_is, |h| unsafe { diffusph_write_vtk(h.s, c("/dev/full")) }, -7, "/dev/full: cannot write"),
+    Row("diffusph_write_vtk", as_is, |h| unsafe { diffusph_write_vtk(h.s, c("")) }, -2, ".vtu, or in .vtk"),
+    Row("diffusph_write_vtk", as_is, |h| unsafe { diffusph_write_vtk(h.s, h.path("e.vtp")) }, -2, ".vtu, or in .vtk"),
+    Row("diffusph_write_vtk", as_is, |h| unsafe { diffusph_write_vtk(h.s, c("/dev/full")) }, -2, "'/dev/full'"),
     Row("diffusph_write_vtk", as_is, |h| unsafe { diffusph_write_vtk(h.s, h.path("no/such/a.vtu")) }, -7, "no/such/a.vtu: cannot write"),
     Row("diffusph_write_vtk", empty, |h| unsafe { diffusph_write_vtk(h.s, h.path("a.vtu")) }, -4, "set_particles first"),
     Row("diffusph_write_series", as_is, |h| unsafe { diffusph_write_series(h.s, null()) }, -1, "pvd_path is NULL"),
+    Row("diffusph_write_series", as_is, |h| unsafe { diffusph_write_series(h.s, h.path("run.vtu")) }, -2, "must end in .pvd"),
     Row("diffusph_write_series", as_is, |h| unsafe { diffusph_write_series(h.s, written(h, "bad.pvd", b"<VTKFile/>")) }, -8, "bad.pvd"),
     Row("diffusph_write_series", as_is, |h| unsafe { diffusph_write_series(h.s, h.path("no/such/a.pvd")) }, -7, "no/such"),
     Row("diffusph_read_vtk", as_is, |h| unsafe { diffusph_read_vtk(h.s, null()) }, -1, "path is NULL"),

@@ -277,6 +277,138 @@ fn what_the_world_refuses_is_reported_and_leaves_nothing() {
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
 }
 
+/// A scene on a square lattice, with these lines for [set], [time] and after.
+fn square(set: &str, time: &str, more: &str) -> String {
+    format!(
+        "words = \"heat dim=2 kernel=M4 threads=1\"\n[box]\nlo = [0, 0]\nhi = [1, 1]\nperiodic = true\n[particles]\n\
+         lattice = \"square\"\nn = 10\n[set]\n{set}\n[time]\n{time}\n[output]\npvd = \"out/a.pvd\"\n{more}"
+    )
+}
+
+#[test]
+fn a_scene_goes_on_from_a_snapshot_of_another() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |name: &str, text: &str| {
+        let path = write(&folder, name, text);
+        let answer = ask(program().args(["run", "--json", "--out"]).arg(folder.path()).arg(path));
+        assert_eq!((answer.code, answer.err.as_str()), (Some(0), ""), "{name}");
+        serde_json::from_str::<Value>(&answer.out).unwrap()
+    };
+    let times = || {
+        let series = Series::read(folder.path().join("out/a.pvd")).unwrap();
+        series.entries().iter().map(|e| (e.file.clone(), e.time)).collect::<Vec<_>>()
+    };
+    let content = |name: &str| std::fs::read(folder.path().join("out").join(name)).unwrap();
+    let set = "T = 300\nkappa = 1\nc_v = 3\nsource = 50";
+    let mark = "[[mark]]\nwhere = { r = [0, 0.2], centre = [0.5, 0.5] }\nset = { T = 400 }";
+    run("a.toml", &square(set, "end = 0.5\nsteps = 4", mark));
+    let whole =
+        (times(), ["a_0000.vtu", "a_0001.vtu"].map(content), io::read(folder.path().join("out/a_0004.vtu")).unwrap());
+    // Neither quantities nor box nor start are said again.
+    let again = "words = \"heat dim=2 kernel=M4 threads=1\"\n[particles]\nfile = \"out/a_0002.vtu\"\n[time]\nend = 0.5\n\
+                 steps = 2\n[output]\npvd = \"out/a.pvd\"\n";
+    let report = run("b.toml", again);
+    assert!(
+        report["remarks"].to_string().contains("starts at t = 0.25, the time of the file"),
+        "{}",
+        report["remarks"]
+    );
+    assert!(report["remarks"].to_string().contains("box is that of the file"), "{}", report["remarks"]);
+    assert_eq!((times(), ["a_0000.vtu", "a_0001.vtu"].map(content)), (whole.0, whole.1));
+    let end = io::read(folder.path().join("out/a_0004.vtu")).unwrap();
+    assert!(end.fields == whole.2.fields && end.time == whole.2.time);
+    // What the scene says wins, and is told.
+    let other = again.replace("end = 0.5", "start = 0.3\nend = 0.5");
+    let report = run("c.toml", &other.replace("[particles]", "[box]\nlo = [0, 0]\nhi = [2, 1]\n[particles]"));
+    let remarks = report["remarks"].to_string();
+    assert!(remarks.contains("t = 0.3, as the scene says; the file is of t = 0.25"), "{remarks}");
+    assert!(remarks.contains("[box] of the scene takes the place"), "{remarks}");
+    let late = write(&folder, "late.toml", &again.replace("end = 0.5", "end = 0.2"));
+    let answer = ask(program().args(["run", "--out"]).arg(folder.path()).arg(late));
+    assert!(answer.code == Some(2) && answer.err.contains("later than the start"), "{}", answer.err);
+}
+
+#[test]
+fn what_a_scene_says_in_vain_is_refused_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = "T = 300\nkappa = 1";
+    let mark = |place: &str| square(set, "end = 1", &format!("[[mark]]\nwhere = {place}\nset = {{ T = 400 }}"));
+    let words = |words: &str| square(set, "end = 1", "").replace("kernel=M4", words);
+    for (text, expected) in [
+        (mark("{ r = [5, 6], centre = [0.5, 0.5] }"), "[[mark]] 1 is without particles; none of the 100"),
+        (mark("{ surface = true }"), "without particles"),
+        (mark("{ centre = [0.5, 0.5] }"), "give r"),
+        (square("T = \"300\"\nkappa = 1", "end = 1", ""), "T is '300'; it is in quotes"),
+        (square("T = 300\nkappa = 1\nemissivity = 5", "end = 1", ""), "emissivity is 5; it must be from 0 to 1"),
+        (square("kappa = 1", "end = 1", ""), "run needs T"),
+        (square("T = 300", "end = 1", ""), "run needs kappa"),
+        (words("integrator=euler stages=5"), "stages is 5; it has no effect here"),
+        (words("operator=consistent normalise=pair"), "normalise is pair; it has no effect here"),
+    ] {
+        let path = write(&folder, "a.toml", &text);
+        let answer = ask(program().args(["run", "--out"]).arg(folder.path()).arg(path));
+        assert_eq!((answer.code, answer.out.as_str()), (Some(2), ""), "{expected}: {}", answer.err);
+        assert!(answer.err.contains(expected), "{expected}: {}", answer.err);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1, "{expected}: a folder is left");
+    }
+}
+
+/// A file of points, as other programs write it.
+fn points(folder: &TempDir, name: &str, points: &[[f64; 3]], more: &str) -> PathBuf {
+    let n = points.len();
+    let list: String = points.iter().flatten().map(|v| format!("{v:?} ")).collect();
+    let text = format!(
+        "<VTKFile type=\"UnstructuredGrid\" version=\"1.0\"><UnstructuredGrid><Piece NumberOfPoints=\"{n}\" \
+         NumberOfCells=\"1\"><Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" format=\"ascii\">{list}</DataArray>\
+         </Points>{more}</Piece></UnstructuredGrid></VTKFile>"
+    );
+    write(folder, name, &text)
+}
+
+#[test]
+fn files_that_cannot_be_meant_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let none = points(&folder, "none.vtu", &[], "");
+    let answer = ask(program().arg("check").arg(&none));
+    assert!(answer.code == Some(1) && answer.err.contains("holds no particles"), "{}", answer.err);
+    let scene = |file: &str, dim: usize| {
+        let text = format!(
+            "words = \"heat dim={dim} kernel=M4 threads=1\"\n[particles]\nfile = \"{file}\"\n[set]\nT = 1\nkappa = 1\n\
+             m = 0.01\n[time]\nend = 1e-4\nsteps = 1\n"
+        );
+        write(&folder, "a.toml", &text)
+    };
+    let answer = ask(program().arg("run").arg(scene("none.vtu", 2)));
+    assert!(answer.code == Some(1) && answer.err.contains("holds no particles"), "{}", answer.err);
+    // A plane along x and z.
+    let plane: Vec<[f64; 3]> = (0..100).map(|i| [f64::from(i % 10) / 10.0, 5.0, f64::from(i / 10) / 10.0]).collect();
+    let cells = "<CellData><DataArray type=\"Float64\" Name=\"T\" format=\"ascii\">1</DataArray></CellData>";
+    let file = points(&folder, "plane.vtu", &plane, cells);
+    let answer = ask(program().arg("check").arg(&file));
+    assert_eq!((answer.code, answer.err.as_str()), (Some(0), ""));
+    for expected in
+        ["100 particles, 2-D along x z at y = 5", "\n  z  ", "of cells, not of points", "given in [set]: m, T"]
+    {
+        assert!(answer.out.contains(expected), "{expected}: {}", answer.out);
+    }
+    assert!(!answer.out.contains("\n  y  "), "{}", answer.out);
+    let answer = ask(program().arg("run").arg(scene("plane.vtu", 2)));
+    assert!(
+        answer.code == Some(0) && answer.out.contains("particles lie along x z at y = 5"),
+        "{}{}",
+        answer.out,
+        answer.err
+    );
+    let answer = ask(program().arg("run").arg(scene("plane.vtu", 3)));
+    assert!(
+        answer.code == Some(2) && answer.err.contains("flat along y") && answer.err.contains("dim=2"),
+        "{}",
+        answer.err
+    );
+    let answer = ask(program().arg("run").arg(scene("plane.vtu", 1)));
+    assert!(answer.code == Some(2) && answer.err.contains("vary along x, z"), "{}", answer.err);
+}
+
 #[cfg(unix)]
 mod unix {
     use super::*;

@@ -46,6 +46,7 @@ fn cloud() -> Snapshot {
         ],
         time: Some(0.5),
         notes: vec![("diffusph".into(), "heat".into())],
+        ..Snapshot::default()
     }
 }
 

@@ -134,6 +134,7 @@ fn cloud(n: usize) -> Snapshot {
         ],
         time: Some(0.1 + 0.2),
         notes: vec![("diffusph".into(), "kernel=M6 <κ>".into())],
+        ..Snapshot::default()
     }
 }
 

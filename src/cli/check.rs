@@ -17,14 +17,22 @@ use std::path::Path;
 /// `Io`, `BadFile`; `BadElement` naming the first value that cannot be used.
 pub fn text(path: &Path) -> Result<String> {
     let snapshot = io::read(path)?;
-    let dim = dimensions(&snapshot);
+    if snapshot.points.is_empty() {
+        return Err(Error::BadFile { path: path.display().to_string(), reason: "it holds no particles".into() });
+    }
+    let dim = Solver::dimensions_of(&snapshot);
+    let mut solver = Solver::new(&format!("heat dim={dim} threads=1"))?;
+    solver.set_snapshot(&snapshot)?;
+    let frame = solver.frame();
     let mut text = String::new();
     let time = snapshot.time.map_or(String::new(), |t| format!(", t = {t}"));
-    let _ = writeln!(text, "{}: {} particles, {dim}-D{time}", path.display(), snapshot.points.len());
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate().take(dim) {
-        let _ = writeln!(text, "  {name:<12}{}", Range::of(snapshot.points.iter().map(|p| p[axis])));
+    let along = frame.about().map_or(String::new(), |about| format!(" along {about}"));
+    let _ = writeln!(text, "{}: {} particles, {dim}-D{along}{time}", path.display(), snapshot.points.len());
+    let x: Vec<f64> = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
+    for (axis, name) in frame.names().into_iter().enumerate() {
+        let _ = writeln!(text, "  {name:<12}{}", Range::of(x.iter().skip(axis).step_by(dim).copied()));
     }
-    if let Some((least, mean)) = spacing(&snapshot, dim)? {
+    if let Some((least, mean)) = spacing(&x, dim)? {
         let note = if least == 0.0 { " (some share one place)" } else { "" };
         let _ = writeln!(text, "  spacing     nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}");
     }
@@ -34,16 +42,11 @@ pub fn text(path: &Path) -> Result<String> {
     for (name, note) in &snapshot.notes {
         let _ = writeln!(text, "  note        {name}: {note}");
     }
-    let mut solver = Solver::new(&format!("heat dim={dim} threads=1"))?;
-    solver.set_snapshot(&snapshot)?;
+    for name in &snapshot.of_cells {
+        let _ = writeln!(text, "  {name:<12}of cells, not of points: left aside");
+    }
     let _ = writeln!(text, "usable; {}", missing(&snapshot));
     Ok(text)
-}
-
-/// 1 or 2 where the coordinates beyond are all the same.
-fn dimensions(snapshot: &Snapshot) -> usize {
-    let flat = |axis: usize| snapshot.points.windows(2).all(|p| p[0][axis] == p[1][axis]);
-    (1..=3).rev().find(|&dim| !flat(dim - 1)).unwrap_or(3)
 }
 
 fn describe(field: &Field) -> String {
@@ -60,7 +63,8 @@ fn describe(field: &Field) -> String {
 
 /// What must still be given before it can run.
 fn missing(snapshot: &Snapshot) -> String {
-    let absent: Vec<&str> = ["m", "T", "kappa"].into_iter().filter(|name| snapshot.field(name).is_none()).collect();
+    let given = |name: &&str| snapshot.field(name).is_some();
+    let absent: Vec<&str> = ["m", "T", "kappa"].into_iter().filter(|name| !given(name)).collect();
     match absent.is_empty() {
         true => "nothing is missing".into(),
         false => format!("still to be given in [set]: {}", absent.join(", ")),
@@ -94,14 +98,12 @@ impl std::fmt::Display for Range {
 }
 
 /// The least and the mean distance to the nearest neighbour, in open space; none without two particles.
-fn spacing(snapshot: &Snapshot, dim: usize) -> Result<Option<(f64, f64)>> {
-    let n = snapshot.points.len();
+fn spacing(x: &[f64], dim: usize) -> Result<Option<(f64, f64)>> {
+    let n = x.len() / dim;
     if n < 2 {
         return Ok(None);
     }
-    let x: Vec<f64> = snapshot.points.iter().flat_map(|p| p[..dim].iter().copied()).collect();
-    let x = Strided::new("x", &x, n, dim, dim)?;
-    x.check("x", "coordinates must be finite", f64::is_finite)?;
+    let x = Strided::new("x", x, n, dim, dim)?;
     let pool = Pool::new(1)?;
     let volume: f64 = (0..dim).map(|a| Range::of((0..n).map(|i| x.at(i, a)))).map(|r| r.high - r.low).product();
     if volume == 0.0 {

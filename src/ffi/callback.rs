@@ -81,8 +81,8 @@ pub unsafe extern "C" fn diffusph_set_kappa_callback(
     }
 }
 
-/// Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away. It is called
-/// for every stage, with `user`.
+/// Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away, and so does
+/// setting "source". It is called for every stage, with `user`.
 ///
 /// # Safety
 /// As diffusph_set_kappa_callback.

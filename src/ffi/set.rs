@@ -32,8 +32,8 @@ pub unsafe extern "C" fn diffusph_set_box(s: *mut Handle, lo: *const f64, hi: *c
 }
 
 /// Positions, and with them, where given, masses, densities and smoothing lengths. The same number of particles as
-/// before moves them, and they keep everything else; another number starts anew, and what was given per particle must be
-/// given again. Nothing is copied twice: a host's own layout is described by `stride`, so x[n][3] has 3, and
+/// before moves them, and they keep everything else; where the number changes, what was given per particle must be given
+/// again, or as one number: until then, calls that need it answer OUT_OF_ORDER and name it. Nothing is copied twice: a host's own layout is described by `stride`, so x[n][3] has 3, and
 /// xyzh(4,n) of Fortran has 4.
 ///
 /// \param n      particles
@@ -72,7 +72,7 @@ pub unsafe extern "C" fn diffusph_set_particles(
 }
 
 /// A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. "x" moves
-/// the particles; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
+/// the particles; "u" sets T, which from then on follows where c_v is set; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
 /// xy; xx, yy, zz, xy, yz, xz).
 ///
 /// \param name   which

@@ -69,7 +69,7 @@ fn cloud(data: DataSet) -> Result<Snapshot> {
             }
         }
     }
-    Ok(Snapshot { points, fields, time: None, notes: Vec::new() })
+    Ok(Snapshot { points, fields, ..Snapshot::default() })
 }
 
 fn only<P>(pieces: Vec<Piece<P>>) -> Result<P> {

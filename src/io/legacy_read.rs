@@ -171,6 +171,7 @@ impl<'a> Reader<'a> {
                 )));
             }
             (Of::Points, None) => log::warn!("array '{name}' is not of numbers: left aside"),
+            (Of::Cells(_), _) => self.found.of_cells.push(name),
             (Of::File, Some(data)) if name == "TimeValue" => self.found.time = data.to_f64()?.first().copied(),
             _ => {}
         }

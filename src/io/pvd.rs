@@ -64,6 +64,22 @@ impl Series {
         Ok(())
     }
 
+    /// Where a snapshot of this time goes: the first number, from that of earlier entries on, that none of them has. What
+    /// they list stays untouched.
+    pub fn next_file(&self, time: f64) -> PathBuf {
+        let earlier: Vec<&Entry> = self.entries.iter().filter(|e| e.time < time).collect();
+        let taken = |name: &str| earlier.iter().any(|e| Path::new(&e.file).file_name() == Some(name.as_ref()));
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut number = earlier.len();
+        loop {
+            let name = format!("{stem}_{number:04}.vtu");
+            if !taken(&name) {
+                return self.path.with_file_name(name);
+            }
+            number += 1;
+        }
+    }
+
     /// The listed files in order of time.
     pub fn entries(&self) -> &[Entry] {
         &self.entries

@@ -27,6 +27,7 @@ pub fn cloud(n: usize) -> Snapshot {
         ],
         time: Some(0.1 + 0.2),
         notes: vec![("diffusph".into(), "heat dim=3 <κ> & \"more\"\nkernel=M6".into()), ("none".into(), "".into())],
+        ..Snapshot::default()
     }
 }
 

@@ -12,6 +12,8 @@ pub struct Snapshot {
     pub time: Option<f64>,
     /// Texts that belong to the whole file: (name, text).
     pub notes: Vec<(String, String)>,
+    /// Names of arrays that belong to cells, not to points; they are not read.
+    pub of_cells: Vec<String>,
 }
 
 /// One array: `components` values per point, point after point.

@@ -130,7 +130,9 @@ impl Reader<'_> {
         };
         let fields = arrays(piece, "PointData").filter(numeric).map(|array| self.field(array, n));
         let fields = fields.collect::<Result<_>>()?;
-        Ok(Snapshot { points: coordinates(points.data)?, fields, time: None, notes: Vec::new() })
+        let name = |a: Node| a.attribute("Name").unwrap_or_default().to_string();
+        let of_cells = arrays(piece, "CellData").map(name).collect();
+        Ok(Snapshot { points: coordinates(points.data)?, fields, of_cells, ..Snapshot::default() })
     }
 
     fn field(&self, array: Node, n: usize) -> Result<Field> {

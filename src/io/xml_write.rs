@@ -345,6 +345,7 @@ mod tests {
                 fields: vec![super::super::Field { name, components: 1, data }],
                 time: Some(time),
                 notes: vec![("note".into(), note)],
+                ..Snapshot::default()
             };
             prop_assert!(samples::same(&there_and_back(&snapshot, ALL[option]), &snapshot));
         }

@@ -19,6 +19,17 @@ pub enum Law {
     Table { t: Vec<f64>, kappa: Vec<f64> },
 }
 
+/// In words that [`Law::parse`] reads to the same bits.
+impl std::fmt::Display for Law {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        let list = |values: &[f64]| values.iter().map(|v| format!("{v:?}")).collect::<Vec<_>>().join(",");
+        match self {
+            Law::Power { kappa0, t0, n } => write!(f, "power kappa0={kappa0:?} T0={t0:?} n={n:?}"),
+            Law::Table { t, kappa } => write!(f, "table T={} kappa={}", list(t), list(kappa)),
+        }
+    }
+}
+
 /// Every law with its words.
 pub static LAWS: &[(&str, &str)] = &[
     (

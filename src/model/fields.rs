@@ -8,6 +8,8 @@ pub enum Domain {
     Finite,
     Positive,
     NonNegative,
+    /// From 0 to 1.
+    Share,
 }
 
 impl Domain {
@@ -16,6 +18,7 @@ impl Domain {
             Domain::Finite => v.is_finite(),
             Domain::Positive => v.is_finite() && v > 0.0,
             Domain::NonNegative => v.is_finite() && v >= 0.0,
+            Domain::Share => (0.0..=1.0).contains(&v),
         }
     }
 
@@ -24,6 +27,7 @@ impl Domain {
             Domain::Finite => "it must be finite",
             Domain::Positive => "it must be positive and finite",
             Domain::NonNegative => "it must be finite and not negative",
+            Domain::Share => "it must be from 0 to 1",
         }
     }
 }
@@ -64,7 +68,7 @@ const fn vector(field: Field) -> Field {
     Field { vector: true, ..field }
 }
 
-use Domain::{Finite, NonNegative, Positive};
+use Domain::{Finite, NonNegative, Positive, Share};
 
 /// Inputs first: their position is the index of their storage.
 pub static FIELDS: &[Field] = &[
@@ -78,7 +82,7 @@ pub static FIELDS: &[Field] = &[
     input("source", "W/m^3", Finite, Some(0.0), "heat released per volume"),
     input("flux_in", "W/m^2", Finite, Some(0.0), "heat flux into the particle's area from outside"),
     input("h_conv", "W/(m^2 K)", NonNegative, Some(0.0), "heat transfer coefficient to T_ambient (Robin)"),
-    input("emissivity", "-", NonNegative, Some(0.0), "radiative exchange emissivity sigma_SB (T_ambient^4 - T^4)"),
+    input("emissivity", "-", Share, Some(0.0), "radiative exchange emissivity sigma_SB (T_ambient^4 - T^4)"),
     input("T_ambient", "K", Finite, Some(0.0), "temperature of the surroundings; absolute where there is emissivity"),
     input("area", "m^2", NonNegative, None, "area that faces outside; without it, what the neighbours leave open"),
     input(

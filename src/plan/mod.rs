@@ -1,8 +1,11 @@
 //! From a scene to a list of passes: what runs, what was left out and why, in what memory.
 
+pub mod applies;
 pub mod auto;
 pub mod choices;
 pub mod facts;
+pub mod given;
+pub mod input;
 pub mod motion;
 pub mod preconditioner;
 pub mod prepare;

@@ -7,7 +7,7 @@ use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
 use crate::integrator::Range;
 use crate::memory;
-use crate::model::fields::{self, FIELDS, Slot};
+use crate::model::fields::{self, FIELDS, INPUTS, Slot};
 use crate::model::heat::{Conductivity, Heat, Release};
 use crate::model::surface::{Exchange, Surface};
 use crate::model::tensor::Tensor;
@@ -15,8 +15,11 @@ use crate::operator::table::{self, OPERATORS, Tensor as Form};
 use crate::operator::twice::Recipe;
 use crate::operator::walls::Walls;
 use crate::operator::{Assembly, Matrix, Multigrid, Normalise, Pairs, Sym, Twice, bypass, tensor};
-use crate::space::{Cloud, density, rows::Rows};
+use crate::space::{density, rows::Rows};
 use std::borrow::Cow;
+
+/// How much thinner than wide a cloud is that has no thickness but rounding's.
+const FLAT: f64 = 1e-12;
 
 /// One block in this many is looked at to estimate the number of neighbours.
 const SAMPLE: usize = 16;
@@ -32,6 +35,7 @@ impl State {
     /// # Errors
     /// As [`State::prepare_geometry`].
     pub fn plan(&mut self) -> Result<Plan> {
+        self.refuse_lost("plan", 0..INPUTS)?;
         self.prepare_geometry("plan")?;
         self.prepare_directions("plan")?;
         self.look_for_thin_layers()?;
@@ -55,6 +59,7 @@ impl State {
     /// As [`State::prepare`].
     pub fn prepare_fresh(&mut self, call: &str) -> Result<Plan> {
         self.cloud(call)?;
+        self.refuse_lost(call, 0..INPUTS)?;
         for slot in [fields::T, fields::M] {
             self.need(slot, call)?;
         }
@@ -105,16 +110,20 @@ impl State {
         Ok(())
     }
 
-    /// Smoothing lengths, densities and volumes, given or computed, on cells that fit them.
+    /// Smoothing lengths, densities and volumes, given or computed, on cells that fit them: the same bits for the same
+    /// particles, whatever was asked before.
     pub fn prepare_geometry(&mut self, call: &str) -> Result<()> {
+        self.settle_ties()?;
         if self.geometry.is_some() {
             return Ok(());
         }
         self.cloud(call)?;
+        self.refuse_lost(call, [fields::M, fields::RHO, fields::H])?;
         self.need(fields::M, call)?;
+        // Along axes that are not periodic, whatever the reach.
+        self.refuse_flat(f64::INFINITY)?;
         let start = std::time::Instant::now();
         if self.inputs[fields::H] == Input::Unset && self.inputs[fields::RHO] == Input::Unset {
-            // h is not known before the search that finds it: sort on the finest grid, find h, sort again.
             let h = self.find_lengths(call)?;
             self.inputs[fields::H] = Input::Each(h);
             let made = self.make_geometry(call, true);
@@ -130,6 +139,9 @@ impl State {
 
     /// h together with rho, from the lengths found last where there are any.
     fn find_lengths(&mut self, call: &str) -> Result<Vec<f64>> {
+        // The search for h reaches as far as it may be expected to be; what is found decides on the order that stays.
+        let reach = self.reach(&self.domain, self.len(), |axis| self.extent(axis));
+        self.sort_for(reach)?;
         let m = self.each(fields::M)?;
         let cloud = self.cloud(call)?;
         let last = |&host: &u32| self.last_h[host as usize];
@@ -140,7 +152,7 @@ impl State {
         let h = density::smoothing_lengths(&self.choices.kernel, self.choices.h_fac, cloud, &m, start, &self.pool)?;
         let mut by_host = memory::filled("h", cloud.len(), 0.0)?;
         cloud.host.iter().zip(&h).for_each(|(&host, &h)| by_host[host as usize] = h);
-        self.last_h = by_host;
+        self.found_h = by_host;
         Ok(h)
     }
 
@@ -149,8 +161,9 @@ impl State {
         let (nu, radius) = (self.dim() as f64, self.choices.kernel.radius());
         let mut h = self.lengths(nu)?;
         let reach = radius * h.iter().copied().fold(0.0, f64::max);
-        if !fits(self.cloud(call)?, reach) && reach.is_finite() {
-            self.sort_again(reach)?;
+        self.refuse_flat(reach)?;
+        if !self.cloud(call)?.suits(reach) {
+            self.sort_for(reach)?;
             h = self.lengths(nu)?;
         }
         let m = self.each(fields::M)?;
@@ -169,6 +182,30 @@ impl State {
         Ok(Geometry { h, rho, volume, same_h, neighbours })
     }
 
+    /// Refuses particles that leave an axis of their space empty: sums over neighbours would take a disc for a ball.
+    /// Where the axis is periodic and images of the particles are among the neighbours, it is not empty.
+    fn refuse_flat(&self, reach: f64) -> Result<()> {
+        let Some(cloud) = self.cloud.as_ref().filter(|c| c.len() > c.dim() && !self.choices.allow.flat) else {
+            return Ok(());
+        };
+        let dim = cloud.dim();
+        let extents: Vec<f64> = (0..dim).map(|axis| self.extent(axis)).collect();
+        let widest = extents.iter().copied().fold(0.0, f64::max);
+        let imaged = |axis: usize| cloud.domain.periodic[axis] && reach >= cloud.domain.length(axis);
+        let empty: Vec<usize> = (0..dim).filter(|&a| extents[a] <= FLAT * widest && !imaged(a)).collect();
+        if empty.is_empty() || widest == 0.0 {
+            return Ok(());
+        }
+        let axes: Vec<&str> = empty.iter().map(|&a| ["x", "y", "z"][a]).collect();
+        let (axes, rest) = (axes.join(" and "), dim - empty.len());
+        let value = format!("flat along {axes}: all {} particles have the same", cloud.len());
+        let rule = format!(
+            "particles that fill {rest} of {dim} dimensions need dim={rest} and their other coordinates alone; a sheet or a \
+             row of one layer in {dim}-D space is had by insisting with allow=flat"
+        );
+        Err(Error::bad("x", value, &rule))
+    }
+
     /// h as given, or h_fac (m/rho)^(1/nu).
     fn lengths(&self, nu: f64) -> Result<Vec<f64>> {
         if self.inputs[fields::H] != Input::Unset {
@@ -184,6 +221,7 @@ impl State {
 
     /// An input as an array; a number is repeated.
     pub fn each(&self, slot: Slot) -> Result<Vec<f64>> {
+        self.refuse_lost(FIELDS[slot].name, [slot])?;
         self.repeated(FIELDS[slot].name, &self.inputs[slot])
     }
 
@@ -223,6 +261,8 @@ impl State {
     /// The conductivity of each particle at its temperature, the mean over directions.
     pub fn kappa_now(&mut self) -> Result<Vec<f64>> {
         if !self.kappa_of_t() {
+            self.settle_ties()?;
+            self.refuse_lost("get kappa", fields::TENSOR.chain([fields::KAPPA]))?;
             self.prepare_directions("get kappa")?;
             if self.directions.is_none() {
                 self.need(fields::KAPPA, "get kappa")?;
@@ -529,10 +569,4 @@ fn assembly_of<'a>(
 fn shape_of<'a>(directions: &'a Option<Directions>, units: &'a [Sym]) -> Option<&'a [Sym]> {
     let own = directions.as_ref().map_or(&[][..], |d| &d.shape);
     [own, units].into_iter().find(|s| !s.is_empty())
-}
-
-/// Whether the cloud's cells suit a search that reaches this far: not much more than a cell, and not much less.
-fn fits(cloud: &Cloud, reach: f64) -> bool {
-    let doublings = (reach / cloud.grid.edge).log2();
-    cloud.is_empty() || reach == 0.0 || (doublings - doublings.round()).abs() < 0.06
 }

@@ -1,6 +1,7 @@
 //! One step: prepare, stages on a private copy, check, commit. A step that fails has changed nothing.
 
 use super::choices::Promise;
+use super::input::Energy;
 use super::motion::explicit_limit;
 use super::state::{Input, Made, State};
 use super::{Plan, Report, rules};
@@ -66,8 +67,12 @@ impl State {
         self.timers.add("check", checked.elapsed());
 
         (self.inputs[fields::T], self.made) = (Input::Each(t), made);
+        if self.energy != Energy::Follows {
+            self.energy = Energy::Moved;
+        }
         self.time += dt;
         self.steps += 1;
+        self.was_done_here = true;
         report.time = self.time;
         report.applications = self.applications - applications;
         report.iterations = self.work.iterations - iterations;
@@ -82,7 +87,18 @@ impl State {
     pub fn rate(&mut self) -> Result<Vec<f64>> {
         self.cancel.store(false, Ordering::Relaxed);
         self.set_anew()?;
+        // It counts for the plan, and only if it succeeds for what comes after.
+        let before = self.rates;
         self.rates += 1;
+        let rate = self.rate_now();
+        match &rate {
+            Ok(_) => self.was_done_here = true,
+            Err(_) => self.rates = before,
+        }
+        rate
+    }
+
+    fn rate_now(&mut self) -> Result<Vec<f64>> {
         let mut plan = self.prepare_fresh("rate")?;
         // A bound wants stored weights.
         if !(plan.leaves_out(&rules::USED_ONCE) && plan.leaves_out(&rules::RATE_ONLY)) {

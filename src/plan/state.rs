@@ -2,72 +2,26 @@
 //! or absent. A setter drops what it invalidates; `prepare` makes what is missing.
 
 use super::choices::Promise;
+use super::input::Energy;
+pub use super::input::Input;
 use super::motion::Known;
 use super::preconditioner::Preconditioning;
 use super::report::Timers;
 use super::{Choices, Facts, rules};
-use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::integrator::{Range, Work};
 use crate::memory;
 use crate::model::conductivity::Law;
-use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
+use crate::model::fields::{self, INPUTS, Slot};
 use crate::model::heat::Callback;
 use crate::model::surface::Surface;
 use crate::operator::table::Tensor;
 use crate::operator::{Matrix, Mean, Multigrid, Normalise, Sym, Twice};
 use crate::pool::Pool;
 use crate::space::{Cloud, Domain, facing};
-use std::borrow::Cow;
+use crate::sum;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
-
-/// An input: one number for all, or one per particle in internal order.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub enum Input {
-    #[default]
-    Unset,
-    Number(f64),
-    Each(Vec<f64>),
-}
-
-impl Input {
-    fn default_of(slot: Slot) -> Input {
-        match FIELDS[slot].access {
-            Access::Input { default: Some(v), .. } => Input::Number(v),
-            _ => Input::Unset,
-        }
-    }
-
-    pub fn at(&self, i: usize) -> Option<f64> {
-        match self {
-            Input::Unset => None,
-            Input::Number(v) => Some(*v),
-            Input::Each(v) => v.get(i).copied(),
-        }
-    }
-
-    /// As an array of n; one that is held is borrowed, a number is repeated.
-    pub fn view(&self, n: usize) -> Result<Cow<'_, [f64]>> {
-        match self {
-            Input::Each(v) => Ok(Cow::Borrowed(v)),
-            Input::Number(v) => Ok(Cow::Owned(memory::filled("particle data", n, *v)?)),
-            Input::Unset => Ok(Cow::Owned(memory::filled("particle data", n, 0.0)?)),
-        }
-    }
-
-    /// One number where all values are the same.
-    pub fn compressed(values: Vec<f64>) -> Input {
-        match values.first() {
-            Some(&first) if values.iter().all(|&v| v == first) => Input::Number(first),
-            _ => Input::Each(values),
-        }
-    }
-
-    fn bytes(&self) -> u64 {
-        if let Input::Each(v) = self { memory::bytes(v) } else { 0 }
-    }
-}
 
 /// What follows from positions, masses, densities and smoothing lengths; internal order.
 pub struct Geometry {
@@ -124,6 +78,9 @@ pub struct State {
     pub sigma_sb: f64,
     pub cloud: Option<Cloud>,
     pub inputs: [Input; INPUTS],
+    /// What was given per particle before their number changed, and was not given again.
+    pub lost: [bool; INPUTS],
+    pub energy: Energy,
     pub law: Option<Law>,
     pub kappa_host: Option<Callback>,
     pub source_host: Option<Callback>,
@@ -133,10 +90,12 @@ pub struct State {
     /// Made from the inputs of a tensor, where there are any.
     pub directions: Option<Directions>,
     pub geometry: Option<Geometry>,
-    /// The smoothing lengths found last, in the host's order: where particles move a little, the next are near.
+    /// The smoothing lengths found at the last place where a step or a rate was done, in the host's order: where particles
+    /// move a little, the next are near. Whatever fails, or is only looked at, leaves them as they are.
     pub last_h: Vec<f64>,
-    /// For which reach positions were sorted when they were set.
-    first_reach: f64,
+    /// Those found at this place, which become the last ones when it is left, if something `was_done_here`.
+    pub found_h: Vec<f64>,
+    pub was_done_here: bool,
     pub weights: Option<Weights>,
     pub inverse_capacity: Option<Vec<f64>>,
     pub surface: Option<Surface>,
@@ -172,6 +131,8 @@ impl State {
             sigma_sb: fields::SIGMA_SB,
             cloud: None,
             inputs: std::array::from_fn(Input::default_of),
+            lost: [false; INPUTS],
+            energy: Energy::default(),
             law: None,
             kappa_host: None,
             source_host: None,
@@ -180,7 +141,8 @@ impl State {
             directions: None,
             geometry: None,
             last_h: Vec::new(),
-            first_reach: 0.0,
+            found_h: Vec::new(),
+            was_done_here: false,
             weights: None,
             inverse_capacity: None,
             surface: None,
@@ -218,101 +180,39 @@ impl State {
         self.cloud.as_ref().ok_or_else(|| Error::OutOfOrder { call: call.into(), missing: "set_particles".into() })
     }
 
-    /// Takes a new box; particles already here are wrapped into it.
-    pub fn set_box(&mut self, domain: Domain) -> Result<()> {
-        if domain == self.domain {
-            return Ok(());
-        }
-        let old = std::mem::replace(&mut self.domain, domain);
-        let moved = if self.cloud.is_some() { self.sort_again(0.0) } else { Ok(()) };
-        if moved.is_err() {
-            self.domain = old;
-            return moved;
-        }
-        self.first_reach = 0.0;
-        self.drop_geometry();
-        Ok(())
-    }
-
-    /// Takes positions. Other quantities stay with their particles; they are dropped where the number changes.
-    pub fn set_positions(&mut self, x: Strided) -> Result<()> {
-        if self.cloud.as_ref().is_some_and(|c| c.domain == self.domain && c.is_at(x, &self.pool)) {
-            return Ok(());
-        }
-        let reach = self.reach(x);
-        let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
-        self.place(cloud)?;
-        self.first_reach = reach;
-        self.drop_geometry();
-        Ok(())
-    }
-
-    /// Sorts again for a search that reaches this far.
-    pub fn sort_again(&mut self, reach: f64) -> Result<()> {
-        let Some(cloud) = &self.cloud else { return Ok(()) };
-        let (n, dim) = (cloud.len(), cloud.dim());
-        let mut x = memory::filled("positions", n * dim, 0.0)?;
-        for (i, &host) in cloud.host.iter().enumerate() {
-            (0..dim).for_each(|a| x[host as usize * dim + a] = cloud.x[a][i]);
-        }
-        let x = Strided::new("x", &x, n, dim, dim)?;
-        let cloud = Cloud::sort(&self.domain, x, reach, &self.pool)?;
-        self.place(cloud)
-    }
-
-    /// Puts a newly sorted cloud in place and carries the inputs over to its order.
-    fn place(&mut self, cloud: Cloud) -> Result<()> {
-        let n = cloud.len();
-        if let Some(old) = self.cloud.as_ref().filter(|old| old.len() == n) {
-            let mut was = memory::filled("order", n, 0u32)?;
-            old.host.iter().enumerate().for_each(|(i, &host)| was[host as usize] = i as u32);
-            let mut moved = [const { None }; INPUTS];
-            for (input, moved) in self.inputs.iter().zip(&mut moved) {
-                if let Input::Each(v) = input {
-                    let values = cloud.host.iter().map(|&host| v[was[host as usize] as usize]);
-                    *moved = Some(Input::Each(memory::collected("particle data", values)?));
-                }
-            }
-            for (input, moved) in self.inputs.iter_mut().zip(moved) {
-                if let Some(moved) = moved {
-                    *input = moved;
-                }
-            }
-        } else {
-            for (slot, input) in self.inputs.iter_mut().enumerate().filter(|(_, i)| matches!(i, Input::Each(_))) {
-                *input = Input::default_of(slot);
-            }
-        }
-        self.cloud = Some(cloud);
-        (self.inverse_capacity, self.surface, self.directions) = (None, None, None);
-        Ok(())
-    }
-
-    /// How far a search will reach, as far as that is known before density is.
-    fn reach(&self, x: Strided) -> f64 {
+    /// How far a search will reach, as far as that is known before smoothing lengths are: the same for the same
+    /// particles, whatever was asked before.
+    pub fn reach(&self, domain: &Domain, n: usize, extent: impl Fn(usize) -> f64) -> f64 {
         let radius = self.choices.kernel.radius();
-        if let Some(g) = &self.geometry {
-            return radius * g.h.iter().copied().fold(0.0, f64::max);
+        if self.last_h.len() == n && n > 0 {
+            return radius * self.last_h.iter().copied().fold(0.0, f64::max);
         }
-        let mut volume = 1.0;
-        for axis in 0..self.dim() {
-            let range =
-                (0..x.len()).map(|i| x.at(i, axis)).fold((f64::MAX, f64::MIN), |(l, h), v| (l.min(v), h.max(v)));
-            volume *= if self.domain.periodic[axis] { self.domain.length(axis) } else { (range.1 - range.0).max(0.0) };
-        }
-        radius * self.choices.h_fac * (volume / x.len().max(1) as f64).powf(1.0 / self.dim() as f64)
+        let length = |axis: usize| if domain.periodic[axis] { domain.length(axis) } else { extent(axis).max(0.0) };
+        let volume: f64 = (0..self.dim()).map(length).product();
+        radius * self.choices.h_fac * (volume / n.max(1) as f64).powf(1.0 / self.dim() as f64)
+    }
+
+    /// How far the particles lie apart along an axis.
+    pub fn extent(&self, axis: usize) -> f64 {
+        let x = self.cloud.as_ref().map_or(&[][..], |c| &c.x[axis]);
+        sum::max(&self.pool, x.len(), |i| x[i]) - sum::min(&self.pool, x.len(), |i| x[i])
     }
 
     /// Stores an input and drops what depended on its old value.
-    pub fn put(&mut self, slot: Slot, input: Input) {
+    pub(super) fn store(&mut self, slot: Slot, input: Input) {
+        self.lost[slot] = false;
+        if slot == fields::T {
+            self.energy = Energy::Follows;
+        }
         if self.inputs[slot] == input {
             return;
         }
-        if slot == fields::KAPPA {
-            fields::TENSOR.for_each(|slot| self.inputs[slot] = Input::Unset);
+        let given = input != Input::Unset;
+        if slot == fields::KAPPA && given {
+            fields::TENSOR.for_each(|slot| (self.inputs[slot], self.lost[slot]) = (Input::Unset, false));
         }
-        if fields::TENSOR.contains(&slot) {
-            self.inputs[fields::KAPPA] = Input::Unset;
+        if fields::TENSOR.contains(&slot) && given {
+            (self.inputs[fields::KAPPA], self.lost[fields::KAPPA]) = (Input::Unset, false);
         }
         (self.inputs[slot], self.span) = (input, None);
         if [fields::T, fields::M, fields::C_V].contains(&slot) {
@@ -346,10 +246,15 @@ impl State {
     /// Positions, masses, densities or smoothing lengths changed.
     pub fn drop_geometry(&mut self) {
         self.moves |= self.steps + self.rates > 0;
+        let found = std::mem::take(&mut self.found_h);
+        if std::mem::take(&mut self.was_done_here) {
+            self.last_h = found;
+        }
         self.forget_geometry();
     }
 
-    fn forget_geometry(&mut self) {
+    /// Makes what follows from positions, masses, densities and smoothing lengths missing.
+    pub fn forget_geometry(&mut self) {
         (self.geometry, self.weights, self.inverse_capacity) = (None, None, None);
         (self.surface, self.bypassed) = (None, None);
         self.forget_operator();
@@ -359,8 +264,8 @@ impl State {
     /// follows, as if the same positions had just been set.
     pub fn set_anew(&mut self) -> Result<()> {
         if self.choices.without(&rules::AT_REST) && !self.moves && self.steps + self.rates > 0 {
-            self.sort_again(self.first_reach)?;
-            self.last_h.clear();
+            let reach = self.reach(&self.domain, self.len(), |axis| self.extent(axis));
+            self.sort_again(reach)?;
             self.forget_geometry();
         }
         Ok(())
@@ -525,7 +430,7 @@ impl State {
             .weights
             .as_ref()
             .map_or(0, |w| w.matrix.bytes() + memory::bytes(&w.moments) + w.twice.as_ref().map_or(0, Twice::bytes));
-        let inputs: u64 = self.inputs.iter().map(Input::bytes).sum();
+        let inputs = self.inputs.iter().map(Input::bytes).sum::<u64>() + self.energy.bytes();
         let capacity = self.inverse_capacity.as_ref().map_or(0, memory::bytes);
         self.cloud.as_ref().map_or(0, Cloud::bytes)
             + geometry
@@ -533,6 +438,7 @@ impl State {
             + inputs
             + capacity
             + memory::bytes(&self.last_h)
+            + memory::bytes(&self.found_h)
             + self.multigrid.bytes()
             + self.work.bytes()
     }

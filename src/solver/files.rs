@@ -1,12 +1,15 @@
 //! Particles from and to VTK files.
 
-use super::{Solver, expect};
+use super::frame::Frame;
+use super::restart::{self, Notes};
+use super::{Solver, check, expect};
 use crate::array::Strided;
-use crate::error::Result;
-use crate::io::{self, Column, Entry, Options, Series, Snapshot, Values, View};
+use crate::error::{Error, Result};
+use crate::io::{self, Column, Field, Options, Series, Snapshot, Values, View};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, INPUTS};
-use crate::plan::state::Input;
+use crate::plan::given::{Offer, Offered};
+use crate::plan::input::{Energy, Input};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
@@ -14,10 +17,11 @@ use std::path::{Path, PathBuf};
 const ALWAYS: &[&str] = &["T", "m", "rho", "h", "kappa"];
 
 impl Solver {
-    /// Writes particles and their quantities as a `.vtu` (or legacy `.vtk`, by the name's ending) with the time.
+    /// Writes particles and their quantities as a `.vtu` (or legacy `.vtk`, by the name's ending) with the time. A `.vtu`
+    /// holds all that decides how the solver goes on; legacy files are for other tools, and have no place for it.
     ///
     /// # Errors
-    /// `Io`; `OutOfOrder` before T, m and kappa are known. An existing file stays whole.
+    /// `BadValue` for another ending; `Io`; `OutOfOrder` before T, m and kappa are known. An existing file stays whole.
     pub fn write_vtk(&mut self, path: impl AsRef<Path>) -> Result<()> {
         self.write_vtk_with(path, Options::default(), &[])
     }
@@ -28,57 +32,72 @@ impl Solver {
     /// As [`Solver::write_vtk`]; `UnknownWord` for a quantity that does not exist.
     pub fn write_vtk_with(&mut self, path: impl AsRef<Path>, options: Options, extra: &[&str]) -> Result<()> {
         let path = path.as_ref();
-        let mut names = ALWAYS.to_vec();
-        let each = |slot: &usize| match &self.state.inputs[*slot] {
-            Input::Each(_) => true,
-            given => fields::TENSOR.contains(slot) && *given != Input::Unset,
-        };
-        names.extend((0..INPUTS).filter(each).map(|slot| FIELDS[slot].name).chain(extra.iter().copied()));
-        let mut fields = Vec::new();
-        for (at, &name) in names.iter().enumerate() {
-            if !names[..at].contains(&name) {
-                let components = if fields::field(name)?.vector { self.dim() } else { 1 };
-                fields.push((name, components, self.get_all(name)?));
+        let legacy = match ending(path).as_str() {
+            "vtu" => false,
+            "vtk" => true,
+            _ => {
+                let rule = "its name must end in .vtu, or in .vtk for a legacy file; write_series keeps a .pvd";
+                return Err(Error::bad("path", format!("'{}'", path.display()), rule));
             }
+        };
+        self.state.cloud("write_vtk")?;
+        self.state.refuse_lost("write_vtk", 0..INPUTS)?;
+        let mut fields = Vec::new();
+        for name in self.columns(extra) {
+            let components = if fields::field(name)?.vector { self.dim() } else { 1 };
+            fields.push((name, components, self.get_all(name)?));
         }
         let (n, dim, x) = (self.len(), self.dim(), self.get_all("x")?);
-        let points = Values::computed(3 * n, |first, block: &mut [f64]| {
+        let frame = self.frame.clone();
+        let points = Values::computed(3 * n, move |first, block: &mut [f64]| {
             for (k, value) in block.iter_mut().enumerate() {
                 let (i, axis) = ((first + k) / 3, (first + k) % 3);
-                *value = if axis < dim { x[i * dim + axis] } else { 0.0 };
+                *value = frame.outward(&x[i * dim..(i + 1) * dim], axis);
             }
         });
         let column = |name, components, values| Column { name: Cow::Borrowed(name), components, values };
-        let view = View {
-            n,
-            points,
-            fields: fields.iter().map(|(name, c, v)| column(*name, *c, Values::stored(v))).collect(),
-            time: Some(self.state.time),
-            notes: vec![
-                ("diffusph".into(), env!("CARGO_PKG_VERSION").into()),
-                ("words".into(), self.words().to_string().into()),
-            ],
-        };
-        if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("vtk")) {
-            io::write_legacy(path, &view)
-        } else {
-            io::write_vtu(path, &view, options)
+        let mut fields: Vec<Column> = fields.iter().map(|(name, c, v)| column(*name, *c, Values::stored(v))).collect();
+        if self.state.last_h.len() == n && n > 0 && !legacy {
+            fields.push(column(restart::H_START, 1, Values::stored(&self.state.last_h)));
         }
+        let notes = self.notes().into_iter().map(|(name, text)| (name.into(), text.into())).collect();
+        let view = View { n, points, fields, time: Some(self.state.time), notes };
+        if legacy { io::write_legacy(path, &view) } else { io::write_vtu(path, &view, options) }
+    }
+
+    /// The quantities of a snapshot: what is always there, what was given per particle, and `extra`.
+    fn columns<'a>(&self, extra: &[&'a str]) -> Vec<&'a str> {
+        let each = |slot: &usize| {
+            let input = &self.state.inputs[*slot];
+            input.is_each() || (fields::TENSOR.contains(slot) && *input != Input::Unset)
+        };
+        let given = (0..INPUTS).filter(each).map(|slot| FIELDS[slot].name);
+        let energy = match &self.state.energy {
+            Energy::Given(Input::Each(_)) | Energy::Moved => Some("u"),
+            _ => None,
+        };
+        let mut names: Vec<&str> = Vec::new();
+        for name in ALWAYS.iter().copied().chain(given).chain(energy).chain(extra.iter().copied()) {
+            if !names.contains(&name) {
+                names.push(name);
+            }
+        }
+        names
     }
 
     /// Writes the next numbered snapshot beside a `.pvd` list and lists it; answers its path. Snapshots listed at this
-    /// time or later are replaced: a run that was restarted goes on where it stands.
+    /// time or later are replaced: a run that was restarted goes on where it stands, and touches no file that an earlier
+    /// entry lists.
     ///
     /// # Errors
     /// As [`Solver::write_vtk`]; `BadFile` when the list is none.
     pub fn write_series(&mut self, list: impl AsRef<Path>) -> Result<PathBuf> {
         let list = list.as_ref();
+        if ending(list) != "pvd" {
+            return Err(Error::bad("pvd_path", format!("'{}'", list.display()), "its name must end in .pvd"));
+        }
         let mut series = Series::open_or_create(list)?;
-        let earlier: Vec<&Entry> = series.entries().iter().filter(|e| e.time < self.state.time).collect();
-        let taken = |name: &String| earlier.iter().any(|e| Path::new(&e.file).file_name() == Some(name.as_ref()));
-        let stem = list.file_stem().unwrap_or_default().to_string_lossy();
-        let names = (earlier.len()..).map(|number| format!("{stem}_{number:04}.vtu"));
-        let path = list.with_file_name(names.filter(|name| !taken(name)).take(1).collect::<String>());
+        let path = series.next_file(self.state.time);
         let replaced = path.exists();
         self.write_vtk(&path)?;
         series.append(self.state.time, &path).inspect_err(|_| {
@@ -89,30 +108,97 @@ impl Solver {
         Ok(path)
     }
 
-    /// Particles from a VTK file: positions, every array that has the name of an input, and the time if there is one.
+    /// Particles from a VTK file. From a snapshot of ours: all that it holds, in place of what was set before, so that the
+    /// solver goes on as the one that wrote it; its words and callbacks stay. From the file of another program: positions,
+    /// every array that has the name of an input, and the time if there is one. Where fewer than three dimensions are
+    /// filled, they may be along any axes.
     ///
     /// # Errors
-    /// `Io`, `BadFile`; `BadElement` naming the first bad value. Nothing is changed then.
+    /// `Io`, `BadFile`; `BadElement` naming the first bad value; `BadValue` where the particles fill more dimensions than
+    /// the solver has; `OutOfOrder` naming a callback that the snapshot needs. Nothing is changed then.
     pub fn read_vtk(&mut self, path: impl AsRef<Path>) -> Result<()> {
         self.set_snapshot(&io::read(path)?)
     }
 
-    /// The same from a snapshot in memory. Coordinates beyond `dim` are left aside.
+    /// The same from a snapshot in memory.
     ///
     /// # Errors
     /// As [`Solver::read_vtk`].
     pub fn set_snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
         let (n, dim) = (snapshot.points.len(), self.dim());
-        let x = memory::collected("x", (0..n * dim).map(|k| snapshot.points[k / dim][k % dim]))?;
+        let notes = Notes::read(snapshot, dim)?;
+        let frame = Frame::of(&snapshot.points, dim, restart::axes(snapshot))?;
+        let mut x = memory::reserved("x", n * dim)?;
+        snapshot.points.iter().for_each(|p| x.extend(frame.inward(*p)));
+        let x = Strided::new("x", &x, n, dim, dim)?;
+        x.check("x", "coordinates must be finite", f64::is_finite)?;
         let mut found = Vec::new();
-        for input in &FIELDS[..INPUTS] {
-            let Some(field) = snapshot.field(input.name) else { continue };
-            expect(input.name, field.components, 1, "one component")?;
-            found.push((input.name, field.data.to_f64()?));
+        for (slot, input) in FIELDS[..INPUTS].iter().enumerate() {
+            let wanted = notes.as_ref().is_none_or(|notes| notes.arrays.contains(&slot));
+            match snapshot.field(input.name).filter(|_| wanted) {
+                Some(field) => found.push((slot, doubles(field)?)),
+                None if notes.is_some() && wanted => return Err(lacks(input.name)),
+                None => {}
+            }
         }
-        let given: Vec<_> = found.iter().map(|(name, values)| (*name, Strided::packed(values))).collect();
-        self.set_particles_with(Strided::new("x", &x, n, dim, dim)?, &given)?;
+        let mut given: Vec<(usize, Offered)> = Vec::new();
+        for (slot, values) in &found {
+            let values = Strided::packed(values);
+            check(*slot, FIELDS[*slot].name, &values, n)?;
+            given.push((*slot, Offered::Each(values)));
+        }
+        let Some(notes) = notes else {
+            let domain = self.state.domain.clone();
+            self.state.accept(&Offer { domain, x, given: &given, energy: None, anew: false })?;
+            self.state.time = snapshot.time.unwrap_or(self.state.time);
+            self.frame = frame;
+            return Ok(());
+        };
+        self.refuse_missing_functions(&notes)?;
+        let array = |name: &str, like: usize| {
+            let values = snapshot.field(name).map(doubles).transpose()?;
+            values.map(|values| check(like, name, &Strided::packed(&values), n).map(|()| values)).transpose()
+        };
+        let last_h = array(restart::H_START, fields::H)?.unwrap_or_default();
+        let u = match notes.energy {
+            Some(None) => array("u", fields::T)?.ok_or_else(|| lacks("u")).map(Some)?,
+            _ => None,
+        };
+        given.extend(notes.numbers.iter().map(|(slot, v)| (*slot, Offered::Number(*v))));
+        let energy = match (&u, notes.energy) {
+            (Some(u), _) => Some(Offered::Each(Strided::packed(u))),
+            (None, Some(Some(u))) => Some(Offered::Number(u)),
+            _ => None,
+        };
+        self.state.accept(&Offer { domain: notes.domain.clone(), x, given: &given, energy, anew: true })?;
+        self.resume(notes, last_h);
         self.state.time = snapshot.time.unwrap_or(self.state.time);
+        self.frame = frame;
         Ok(())
     }
+
+    /// How many dimensions the particles of a snapshot fill, or are said to.
+    pub fn dimensions_of(snapshot: &Snapshot) -> usize {
+        let named = restart::axes(snapshot).map(|axes| axes.split_whitespace().count());
+        named.unwrap_or_else(|| super::frame::varying(&snapshot.points).len()).clamp(1, 3)
+    }
+
+    /// How the solver's axes lie in those of its files.
+    pub fn frame(&self) -> &Frame {
+        &self.frame
+    }
+}
+
+fn doubles(field: &Field) -> Result<Vec<f64>> {
+    expect(&field.name, field.components, 1, "one component")?;
+    field.data.to_f64()
+}
+
+fn lacks(name: &str) -> Error {
+    let rule = "the snapshot's notes say that it was given per particle; it was changed since";
+    Error::bad("snapshot", format!("without an array {name}"), rule)
+}
+
+fn ending(path: &Path) -> String {
+    path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }

@@ -6,23 +6,29 @@
 //! | `mod` | create, set, step |
 //! | `query` | get: fields and numbers, computed when asked for |
 //! | `files` | particles from and to VTK files |
+//! | `restart` | what a snapshot holds so that a run goes on from it |
+//! | `frame` | how a plane or a line lies in a file |
 //! | `trial` | the same particles with other words |
 //! | `catalogue` | what can be chosen, by name |
 
 pub mod catalogue;
 mod files;
+pub mod frame;
 mod query;
+mod restart;
 pub mod trial;
 
 use crate::array::{Strided, StridedMut};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::conductivity::Law;
-use crate::model::fields::{self, Access, FIELDS, NUMBERS};
+use crate::model::fields::{self, Access, Domain, FIELDS, NUMBERS};
 use crate::model::heat::Callback;
+use crate::plan::given::{Offer, Offered};
 use crate::plan::state::{Input, Progress, State};
 use crate::plan::{Choices, Plan, Report};
-use crate::space::Domain;
+use crate::space;
+use frame::Frame;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -49,6 +55,7 @@ use std::sync::atomic::AtomicBool;
 /// ```
 pub struct Solver {
     state: State,
+    frame: Frame,
 }
 
 impl Solver {
@@ -58,11 +65,20 @@ impl Solver {
     /// # Errors
     /// `UnknownWord` with the nearest known word, `BadValue`.
     pub fn new(words: &str) -> Result<Solver> {
-        Ok(Solver { state: State::new(Choices::parse(words)?)? })
+        let state = State::new(Choices::parse(words)?)?;
+        Ok(Solver { frame: Frame::first(state.dim()), state })
     }
 
     pub fn dim(&self) -> usize {
         self.state.dim()
+    }
+
+    /// Whether a step could be prepared: nothing is missing.
+    ///
+    /// # Errors
+    /// As [`Solver::plan`]; `OutOfOrder` naming what must be set before `call`.
+    pub fn ready(&mut self, call: &str) -> Result<()> {
+        self.state.prepare_fresh(call).map(drop)
     }
 
     /// Number of particles; 0 before `set_particles`.
@@ -88,31 +104,48 @@ impl Solver {
         for (name, len) in [("lo", lo.len()), ("hi", hi.len()), ("periodic", periodic.len())] {
             expect(name, len, self.dim(), "one value per axis")?;
         }
-        self.state.set_box(Domain::new(lo, hi, periodic)?)
+        self.state.set_box(space::Domain::new(lo, hi, periodic)?)
     }
 
-    /// Positions, `dim` components each. The same number again moves the particles, which keep all else; another
-    /// number starts anew, and what was given per particle must be given again.
+    /// Positions, `dim` components each. The same number again moves the particles, which keep all else. Where the number
+    /// changes, what was given per particle must be given again, or as one number: until then, calls that need it answer
+    /// `OutOfOrder`.
     ///
     /// # Errors
     /// `WrongCount`, `BadElement` naming the first coordinate that is not finite, `NoMemory`.
     pub fn set_particles(&mut self, x: Strided) -> Result<()> {
-        expect("x", x.components(), self.dim(), "dim components per particle")?;
-        self.state.set_positions(x)
+        self.set_particles_with(x, &[])
     }
 
-    /// Positions together with inputs per particle: all of them are checked before anything is changed.
+    /// Positions together with inputs per particle: all of them are taken, or nothing is changed.
     ///
     /// # Errors
     /// As [`Solver::set_particles`] and [`Solver::set`].
     pub fn set_particles_with(&mut self, x: Strided, given: &[(&str, Strided)]) -> Result<()> {
         expect("x", x.components(), self.dim(), "dim components per particle")?;
         x.check("x", "coordinates must be finite", f64::is_finite)?;
+        let mut slots = Vec::new();
         for (name, values) in given {
-            check(fields::slot(name)?, name, values, x.len())?;
+            let slot = fields::slot(name)?;
+            check(slot, name, values, x.len())?;
+            slots.push((slot, Offered::Each(*values)));
         }
-        self.set_particles(x)?;
-        given.iter().try_for_each(|(name, values)| self.set(name, *values))
+        let domain = self.state.domain.clone();
+        self.state.accept(&Offer { domain, x, given: &slots, energy: None, anew: false })?;
+        self.forget_functions(slots.iter().map(|(slot, _)| *slot));
+        Ok(())
+    }
+
+    /// Setting a quantity takes a function away that gave it.
+    fn forget_functions(&mut self, slots: impl Iterator<Item = fields::Slot>) {
+        for slot in slots {
+            if slot == fields::KAPPA && self.state.kappa_of_t() {
+                self.state.set_kappa_of_t(None, None);
+            }
+            if slot == fields::SOURCE {
+                self.state.source_host = None;
+            }
+        }
     }
 
     /// A quantity for each particle; the catalogue `fields` lists them.
@@ -127,21 +160,21 @@ impl Solver {
         if let Some(slots) = fields::group(name, self.dim()) {
             expect(name, values.components(), slots.len(), "one component for each")?;
             self.state.cloud("set")?;
-            let parts = || slots.iter().enumerate().map(|(c, &slot)| (slot, FIELDS[slot].name, values.component(c)));
-            parts().try_for_each(|(slot, name, part)| check(slot, name, &part, self.len()))?;
-            return parts().collect::<Vec<_>>().into_iter().try_for_each(|(_, name, part)| self.set(name, part));
+            let mut parts = Vec::new();
+            for (component, &slot) in slots.iter().enumerate() {
+                let (name, part) = (FIELDS[slot].name, values.component(component));
+                check(slot, name, &part, self.len())?;
+                parts.push((slot, Input::Each(self.state.cloud("set")?.inward(name, part, 0)?)));
+            }
+            // None of these can fail any more.
+            return parts.into_iter().try_for_each(|(slot, input)| self.put(slot, input));
         }
         let energy = name == "u";
         let slot = if energy { fields::T } else { fields::slot(name)? };
         let cloud = self.state.cloud("set")?;
         check(slot, name, &values, self.len())?;
-        let mut values = cloud.inward(name, values, 0)?;
-        if energy {
-            let c_v = self.state.each(fields::C_V)?;
-            values.iter_mut().zip(c_v).for_each(|(u, c_v)| *u /= c_v);
-        }
-        self.put(slot, Input::Each(values));
-        Ok(())
+        let values = Input::Each(cloud.inward(name, values, 0)?);
+        if energy { self.state.put_energy(values) } else { self.put(slot, values) }
     }
 
     /// One value for all particles, or a number of the solver such as `time` or `sigma_SB`.
@@ -152,6 +185,7 @@ impl Solver {
         let own = NUMBERS.iter().find(|n| n.name == name);
         let domain = match own {
             Some(number) => number.settable,
+            None if name == "u" => Some(Domain::Finite),
             None => match FIELDS[fields::slot(name)?].access {
                 Access::Input { domain, .. } => Some(domain),
                 Access::Output => None,
@@ -165,16 +199,16 @@ impl Solver {
         match name {
             "time" => self.state.time = value,
             "sigma_SB" => self.state.set_sigma_sb(value),
-            _ => self.put(fields::slot(name)?, Input::Number(value)),
+            "u" => self.state.put_energy(Input::Number(value))?,
+            _ => self.put(fields::slot(name)?, Input::Number(value))?,
         }
         Ok(())
     }
 
-    fn put(&mut self, slot: fields::Slot, input: Input) {
-        if slot == fields::KAPPA && self.state.kappa_of_t() {
-            self.state.set_kappa_of_t(None, None);
-        }
-        self.state.put(slot, input);
+    fn put(&mut self, slot: fields::Slot, input: Input) -> Result<()> {
+        self.state.put(slot, input)?;
+        self.forget_functions([slot].into_iter());
+        Ok(())
     }
 
     /// kappa(T) in words: `power kappa0=1 T0=300 n=2.5`, `table T=300,400 kappa=1,2`; the catalogue `laws`.
@@ -194,7 +228,7 @@ impl Solver {
         self.state.set_kappa_of_t(None, callback);
     }
 
-    /// Heat released per volume by a function, in place of `source`; none takes it away.
+    /// Heat released per volume by a function, in place of `source`; none takes it away, and so does setting `source`.
     pub fn set_source_callback(&mut self, callback: Option<Callback>) {
         self.state.source_host = callback;
     }

@@ -22,6 +22,7 @@ impl Solver {
         self.state.cloud("get")?;
         expect(name, out.len(), self.len(), "one value per particle")?;
         expect(name, out.components(), components, "dim components for vectors, else 1")?;
+        self.state.settle_ties()?;
         let values = values(&mut self.state, field)?;
         let cloud = self.state.cloud("get")?;
         for (c, values) in values.iter().enumerate() {
@@ -51,7 +52,7 @@ impl Solver {
         let state = &mut self.state;
         let temperatures = |state: &State| -> Result<Vec<f64>> {
             state.cloud("get_number")?;
-            state.each(fields::T)
+            given(state, fields::T)
         };
         let moments = |state: &mut State, fold: fn(f64, f64) -> f64, start: f64| -> Result<f64> {
             Ok(prepared(state)?.moments.iter().copied().fold(start, fold))
@@ -60,7 +61,13 @@ impl Solver {
             "time" => state.time,
             "sigma_SB" => state.sigma_sb,
             "n" => state.len() as f64,
-            "energy" => state.energy(&temperatures(state)?),
+            "energy" => {
+                let t = temperatures(state)?;
+                for slot in [fields::M, fields::C_V] {
+                    needed(state, slot)?;
+                }
+                state.energy(&t)
+            }
             "T_min" => state.extrema(&temperatures(state)?).0,
             "T_max" => state.extrema(&temperatures(state)?).1,
             "limit" => state.limit()?,
@@ -89,6 +96,8 @@ impl Solver {
                 state.bypassed.map_or(0.0, |(_, over)| over as f64)
             }
             "growth_rate" => {
+                // First, since it may put the particles in another order.
+                prepared(state)?;
                 let t = temperatures(state)?;
                 state.growth(&t)?
             }
@@ -122,6 +131,7 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
             return columns(&found, state.dim());
         }
         "grad_T" => {
+            geometry(state)?;
             let t = given(state, fields::T)?;
             return gradient_of(state, |a, b| t[b] - t[a]);
         }
@@ -131,9 +141,14 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
         "h" => memory::copied("h", &geometry(state)?.h)?,
         "area" => {
             geometry(state)?;
+            state.refuse_lost("get area", [fields::AREA])?;
             state.areas(|_| true)?
         }
-        "u" => times_c_v(state, given(state, fields::T)?)?,
+        "u" => {
+            needed(state, fields::T)?;
+            needed(state, fields::C_V)?;
+            state.energies()?.view(n)?.into_owned()
+        }
         "dT_dt" => state.rate()?,
         "rate" => {
             let rate = state.rate()?;
@@ -148,8 +163,8 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
         }
         "order_reached" => orders(state)?,
         "omega" => {
-            let m = given(state, fields::M)?;
             geometry(state)?;
+            let m = given(state, fields::M)?;
             state.with_rows(|rows| density::omega(&state.choices.kernel, rows, &m, &state.pool))?
         }
         "depth" => {
@@ -163,11 +178,17 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
 
 /// An input as an array, or the error that says that it was not set.
 fn given(state: &State, slot: Slot) -> Result<Vec<f64>> {
+    needed(state, slot)?;
+    state.each(slot)
+}
+
+fn needed(state: &State, slot: Slot) -> Result<()> {
+    let name = FIELDS[slot].name;
+    state.refuse_lost(&format!("get {name}"), [slot])?;
     if state.inputs[slot] == Input::Unset && !state.is_empty() {
-        let name = FIELDS[slot].name;
         return Err(Error::OutOfOrder { call: format!("get {name}"), missing: format!("set {name}") });
     }
-    state.each(slot)
+    Ok(())
 }
 
 fn geometry(state: &mut State) -> Result<&crate::plan::state::Geometry> {
@@ -205,6 +226,8 @@ fn gradient_of(state: &mut State, rise: impl Fn(usize, usize) -> f64 + Sync + Se
 /// operator exchanges heat, so that it is the same flux on both sides of a jump of kappa. Times −S where kappa S is a
 /// tensor. Two sweeps average fluxes where pairs average kappa arithmetically.
 fn flux(state: &mut State) -> Result<Vec<Vec<f64>>> {
+    // First, since it may put the particles in another order.
+    geometry(state)?;
     let (t, kappa, mean) = (given(state, fields::T)?, state.kappa_now()?, state.mean());
     let by_pair = !matches!(state.choices.operator.tensor, Tensor::Twice { .. });
     let mut flux = gradient_of(state, |a, b| match by_pair {

@@ -5,6 +5,7 @@ use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, INPUTS};
+use crate::plan::given::{Offer, Offered};
 use crate::plan::state::{Input, State};
 use crate::space::Domain;
 use std::sync::atomic::Ordering;
@@ -90,18 +91,17 @@ impl Solver {
 
     fn hand_over(&self, other: &mut State, x: Strided, inputs: [Input; INPUTS]) -> Result<()> {
         let own = &self.state;
+        self.state.refuse_lost("a trial", 0..INPUTS)?;
         (other.time, other.sigma_sb, other.law) = (own.time, own.sigma_sb, own.law.clone());
-        other.set_box(own.domain.clone())?;
-        other.set_positions(x)?;
-        for (slot, input) in inputs.into_iter().enumerate() {
-            other.inputs[slot] = match input {
-                Input::Each(v) => {
-                    Input::Each(other.cloud("a trial")?.inward(FIELDS[slot].name, Strided::packed(&v), 0)?)
-                }
-                number => number,
-            };
+        let mut given = Vec::new();
+        for (slot, input) in inputs.iter().enumerate() {
+            match input {
+                Input::Unset => {}
+                Input::Number(v) => given.push((slot, Offered::Number(*v))),
+                Input::Each(values) => given.push((slot, Offered::Each(Strided::packed(values)))),
+            }
         }
-        Ok(())
+        other.accept(&Offer { domain: own.domain.clone(), x, given: &given, energy: None, anew: true })
     }
 
     /// Exchanges the host's functions; called twice, they are back.

@@ -6,11 +6,17 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
 use rayon::slice::ParallelSliceMut;
+use std::cmp::Ordering;
 
 /// Each cell is cut this many times per axis (in powers of two) for the order inside it.
 const CUTS: i32 = 2;
 
-/// Positions sorted along a Morton curve. Ties are broken by coordinates, then by host index.
+/// A reach is rounded up to one of so many in a doubling: the order of the particles then depends on where they are and
+/// how far the search goes, and not on which search came before.
+const REACHES: f64 = 16.0;
+
+/// Positions sorted along a Morton curve. Ties are broken by coordinates, then by host index; who has data of the
+/// particles breaks them by those first: [`Cloud::reorder`].
 #[derive(Debug, Clone)]
 pub struct Cloud {
     pub domain: Domain,
@@ -21,6 +27,10 @@ pub struct Cloud {
     /// The Morton key of each particle's finest cell.
     pub keys: Vec<u64>,
     pub grid: Grid,
+    /// The rounded reach that the grid was made for.
+    reach: f64,
+    /// Some particles are in one place: neighbours in this order with the same coordinates.
+    pub shared: bool,
 }
 
 /// The finest cells of the Morton curve.
@@ -72,6 +82,7 @@ impl Cloud {
         }
         x.check("x", "coordinates must be finite", f64::is_finite)?;
         let (lo, hi) = bounds(domain, x);
+        let reach = rounded(reach);
         let grid = Grid::new(domain, lo, hi, reach);
         let position = |i: usize| {
             let mut p = [0.0; 3];
@@ -107,7 +118,41 @@ impl Cloud {
                 }
             });
         }
-        Ok(Cloud { domain: domain.clone(), x: axes, host, keys, grid })
+        let mut cloud = Cloud { domain: domain.clone(), x: axes, host, keys, grid, reach, shared: false };
+        cloud.shared = crate::sum::first(pool, cloud.len(), |i| i > 0 && cloud.in_one_place(i - 1, i)).is_some();
+        Ok(cloud)
+    }
+
+    /// Whether its cells are those that a sort for this reach makes.
+    pub fn suits(&self, reach: f64) -> bool {
+        let reach = rounded(reach);
+        self.reach == reach || (self.reach.is_nan() && reach.is_nan())
+    }
+
+    /// Whether two particles have the same coordinates to the bit.
+    pub fn in_one_place(&self, i: usize, j: usize) -> bool {
+        self.x[..self.dim()].iter().all(|x| x[i].to_bits() == x[j].to_bits())
+    }
+
+    /// Host indices in the order in which particles of one place follow each other by `compare`; none where they do
+    /// already.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn reorder(&self, compare: impl Fn(usize, usize) -> Ordering) -> Result<Option<Vec<u32>>> {
+        let tied = |i: &usize| self.in_one_place(i - 1, *i);
+        if !self.shared || (1..self.len()).filter(tied).all(|i| compare(i - 1, i).is_le()) {
+            return Ok(None);
+        }
+        let mut order = memory::collected("order", 0..self.len())?;
+        let mut start = 0;
+        for end in 1..=self.len() {
+            if end == self.len() || !self.in_one_place(end - 1, end) {
+                order[start..end].sort_unstable_by(|&i, &j| compare(i, j).then(self.host[i].cmp(&self.host[j])));
+                start = end;
+            }
+        }
+        memory::collected("order", order.into_iter().map(|i| self.host[i])).map(Some)
     }
 
     pub fn len(&self) -> usize {
@@ -146,6 +191,10 @@ impl Cloud {
     pub fn bytes(&self) -> u64 {
         self.x.iter().map(memory::bytes).sum::<u64>() + memory::bytes(&self.host) + memory::bytes(&self.keys)
     }
+}
+
+fn rounded(reach: f64) -> f64 {
+    if reach > 0.0 && reach.is_finite() { ((reach.log2() * REACHES).ceil() / REACHES).exp2() } else { reach }
 }
 
 fn bounds(domain: &Domain, x: Strided) -> (Axes<f64>, Axes<f64>) {
@@ -187,6 +236,30 @@ mod tests {
         assert!(seen.iter().enumerate().all(|(i, &h)| i == h as usize));
         assert!(a.is_at(Strided::new("x", &x, 2000, 3, 3).unwrap(), &pool));
         assert!(!a.is_at(Strided::new("x", &reversed, 2000, 3, 3).unwrap(), &pool));
+    }
+
+    #[test]
+    fn the_grid_forgets_how_a_reach_was_guessed() {
+        let (pool, x) = (Pool::new(1).unwrap(), scattered(100, 2));
+        let sort =
+            |reach| Cloud::sort(&Domain::open(2), Strided::new("x", &x, 100, 2, 2).unwrap(), reach, &pool).unwrap();
+        let cloud = sort(0.1);
+        assert!(cloud.suits(0.1) && cloud.suits(0.1001) && !cloud.suits(0.11) && !cloud.suits(0.0));
+        assert!(cloud.grid == sort(0.1001).grid && cloud.grid != sort(0.11).grid);
+        // Cells are not shorter than the reach, and hardly longer.
+        assert!((0.1..0.105).contains(&(4.0 * cloud.grid.edge)), "{}", cloud.grid.edge);
+    }
+
+    #[test]
+    fn particles_of_one_place_are_ordered_by_what_is_said() {
+        let (pool, x) = (Pool::new(1).unwrap(), [0.5, 0.1, 0.5, 0.5, 0.9]);
+        let cloud = Cloud::sort(&Domain::open(1), Strided::packed(&x), 0.1, &pool).unwrap();
+        assert!(cloud.shared && cloud.host == [1, 0, 2, 3, 4]);
+        let data: [f64; 5] = [3.0, 0.0, 1.0, 2.0, 0.0];
+        let by_data = |i: usize, j: usize| data[cloud.host[i] as usize].total_cmp(&data[cloud.host[j] as usize]);
+        assert_eq!(cloud.reorder(by_data).unwrap().unwrap(), [1, 2, 3, 0, 4]);
+        assert_eq!(cloud.reorder(|i, j| i.cmp(&j)).unwrap(), None);
+        assert!(!Cloud::sort(&Domain::open(1), Strided::packed(&[0.0, -0.0]), 0.1, &pool).unwrap().shared);
     }
 
     #[test]

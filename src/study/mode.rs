@@ -5,6 +5,7 @@ use super::setup::setup;
 use crate::error::Result;
 use crate::operator::table::{OPERATORS, Tensor};
 use crate::operator::{Normalise, Operator};
+use crate::plan::applies::fitting;
 use crate::words::replaced;
 use std::path::Path;
 use std::sync::Arc;
@@ -100,7 +101,7 @@ impl Sample {
     /// The scene with these words.
     pub fn scene(&self, words: &str) -> Scene {
         let mut scene = self.scene.clone();
-        scene.words = replaced(&scene.words, words, &[]);
+        scene.words = fitting(&replaced(&scene.words, words, &[]));
         scene
     }
 }

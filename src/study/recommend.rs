@@ -15,6 +15,7 @@ use super::surface;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::operator::table;
+use crate::plan::applies::fitting;
 use crate::solver::Solver;
 use crate::solver::trial::Trial;
 use crate::words::replaced;
@@ -146,7 +147,7 @@ fn conservative(solver: &mut Solver, dt: f64, tolerance: f64, free: &[bool]) -> 
 
 /// T with these words; none where they cannot be used here, with the reason in `failed`.
 fn attempted(solver: &mut Solver, words: &str, dt: f64, failed: &mut Error) -> Result<Option<Vec<f64>>> {
-    let line = replaced(solver.words(), words, DROPPED);
+    let line = fitting(&replaced(solver.words(), words, DROPPED));
     match solver.attempt(&line, dt, Duration::MAX) {
         Ok(trial) => Ok(trial.map(|t| t.t)),
         Err(e) if refused(&e) => {
@@ -233,7 +234,7 @@ fn choices(solver: &Solver) -> Result<Vec<String>> {
             for h_fac in H_FACS.map(|h| h * default) {
                 for integrator in INTEGRATORS.iter().filter(|name| solvable || **name != "sdirk2") {
                     let words = format!("operator={operator} kernel={kernel} h_fac={h_fac:.2} integrator={integrator}");
-                    all.push(replaced(solver.words(), &words, DROPPED));
+                    all.push(fitting(&replaced(solver.words(), &words, DROPPED)));
                 }
             }
         }

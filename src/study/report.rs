@@ -8,6 +8,8 @@ use std::fmt;
 #[derive(Debug, Clone, Serialize)]
 pub struct Report {
     pub title: String,
+    /// What was taken from where, where it may not be expected.
+    pub remarks: Vec<String>,
     pub words: String,
     pub particles: usize,
     pub dim: usize,
@@ -142,6 +144,9 @@ impl fmt::Display for Report {
         }
         writeln!(f, "{}", self.words)?;
         let mut row = |name: &str, text: String| writeln!(f, "  {name:<12}{text}");
+        for (i, remark) in self.remarks.iter().enumerate() {
+            row(if i == 0 { "note" } else { "" }, remark.clone())?;
+        }
         let (n, dim, neighbours) = (self.particles, self.dim, self.neighbours);
         row("particles", format!("{n} in {dim}-D, {neighbours:.1} neighbours, {}B", spaced(self.bytes)))?;
         let Work { steps, substeps, applications, limit, .. } = self.work;

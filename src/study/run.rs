@@ -4,7 +4,7 @@ use super::exact::Exact;
 use super::report::{Accuracy, Energy, LeftOut, Report, Seconds, Temperature, Work};
 pub use super::samples::Field;
 use super::scene::{Output, Scene};
-use super::setup::{at_all, setup};
+use super::setup::{Made, at_all, make};
 use crate::error::Result;
 use crate::io::{Series, atomic};
 use crate::model::fields;
@@ -35,6 +35,7 @@ pub struct Study {
     known: Option<Known>,
     /// What it is called.
     source: String,
+    remarks: Vec<String>,
     setup_seconds: f64,
 }
 
@@ -45,10 +46,10 @@ impl Study {
     /// Whatever is wrong with the scene or its files.
     pub fn new(scene: Scene, folder: &Path) -> Result<Study> {
         let start = Instant::now();
-        let (solver, exact) = setup(&scene, folder)?;
+        let Made { solver, exact, remarks } = make(&scene, folder)?;
         let source = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
         let known = exact.map(Known::Solution);
-        Ok(Study { scene, solver, known, source, setup_seconds: start.elapsed().as_secs_f64() })
+        Ok(Study { scene, solver, known, source, remarks, setup_seconds: start.elapsed().as_secs_f64() })
     }
 
     /// What a step will do.
@@ -91,7 +92,9 @@ impl Study {
     /// # Errors
     /// As [`Solver::step`]; `Io`; `Cancelled` when `watch` says so. Snapshots written until then are complete.
     pub fn run(mut self, out: &Path, watch: Watch) -> Result<Report> {
-        let callback = told(self.scene.time.start, self.scene.time.end, watch);
+        // Before a folder is made.
+        self.solver.ready("run")?;
+        let callback = told(self.solver.get_number("time")?, self.scene.time.end, watch);
         self.solver.set_progress_callback(Some(callback));
         let isolated = is_isolated(&mut self.solver)?;
         let (energy, temperature) = (self.solver.get_number("energy")?, extrema(&mut self.solver)?);
@@ -110,6 +113,7 @@ impl Study {
         let left_out = solver.plan()?.left_out.into_iter();
         Ok(Report {
             title: self.scene.title,
+            remarks: self.remarks,
             words: solver.words().to_string(),
             particles: solver.len(),
             dim: solver.dim(),
@@ -135,6 +139,7 @@ impl Study {
 
     fn steps(&mut self, mut writer: Option<&mut Writer>) -> Result<Work> {
         let (solver, time) = (&mut self.solver, &self.scene.time);
+        let start = solver.get_number("time")?;
         let mut work = Work::default();
         let mut write = |solver: &mut Solver, step| match &mut writer {
             Some(writer) => writer.write(solver, step, time.steps),
@@ -143,7 +148,7 @@ impl Study {
         write(solver, 0)?;
         for step in 1..=time.steps {
             // From the ends rather than by adding up, so that the last step arrives at the end.
-            let next = time.start + (time.end - time.start) * f64::from(step) / f64::from(time.steps);
+            let next = start + (time.end - start) * f64::from(step) / f64::from(time.steps);
             let now = solver.get_number("time")?;
             work.add(&solver.step(next - now)?);
             write(solver, step)?;
@@ -214,8 +219,7 @@ impl Writer {
             return Ok(());
         }
         let start = Instant::now();
-        let stem = self.pvd.file_stem().map_or("scene".into(), |s| s.to_string_lossy().into_owned());
-        let file = self.pvd.with_file_name(format!("{stem}_{:04}.vtu", self.count));
+        let file = self.series.next_file(solver.get_number("time")?);
         let extra: Vec<&str> = self.output.fields.iter().map(String::as_str).collect();
         solver.write_vtk_with(&file, self.output.encoding.into(), &extra)?;
         self.series.append(solver.get_number("time")?, &file)?;

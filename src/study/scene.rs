@@ -101,8 +101,8 @@ pub struct Where {
 #[derive(Debug, Clone, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Time {
-    #[serde(default)]
-    pub start: f64,
+    /// Where it is not said, the time of the file, or 0.
+    pub start: Option<f64>,
     pub end: f64,
     #[serde(default = "ten")]
     pub steps: u32,
@@ -184,16 +184,18 @@ impl Scene {
     }
 
     fn check(&self) -> Result<()> {
-        let Time { start, end, steps } = self.time;
-        if !(start.is_finite() && end.is_finite() && end > start) {
-            return Err(Error::bad("time.end", end, &format!("it must be finite and later than time.start = {start}")));
-        }
+        let Time { start, steps, .. } = self.time;
+        self.check_end(start.unwrap_or(if self.particles.file.is_some() { f64::MIN } else { 0.0 }))?;
         if steps == 0 {
             return Err(Error::bad("time.steps", 0, "take at least one step"));
         }
-        let Particles { file, lattice, n, jitter, .. } = &self.particles;
+        let Particles { file, lattice, n, jitter, glass, seed, .. } = &self.particles;
         if file.is_some() == lattice.is_some() {
             return Err(Error::bad("particles", "no clear choice", "give either file, or lattice and n"));
+        }
+        if file.is_some() && (n.is_some() || *jitter != 0.0 || *glass || *seed != one()) {
+            let rule = "n, jitter, seed and glass are of a lattice; the particles of a file lie where it says";
+            return Err(Error::bad("particles", "a file with words for a lattice", rule));
         }
         if lattice.is_some() && (n.is_none_or(|n| n == 0) || self.space.is_none()) {
             return Err(Error::bad("particles", "incomplete", "a lattice needs n > 0 and a [box] to fill"));
@@ -207,6 +209,21 @@ impl Scene {
             }
             Some(output) if output.every == 0 => Err(Error::bad("output.every", 0, "it must be at least 1")),
             _ => Ok(()),
+        }
+    }
+
+    /// Whether the end comes after the start.
+    ///
+    /// # Errors
+    /// `BadValue`.
+    pub fn check_end(&self, start: f64) -> Result<()> {
+        let end = self.time.end;
+        match start.is_finite() && end.is_finite() && end > start {
+            true => Ok(()),
+            false => {
+                let rule = format!("it must be finite and later than the start, t = {start}");
+                Err(Error::bad("time.end", end, &rule))
+            }
         }
     }
 
@@ -237,7 +254,7 @@ mod tests {
     #[test]
     fn a_small_scene_is_short_and_its_defaults_are_as_documented() {
         let scene = Scene::parse("a.toml", SMALL).unwrap();
-        assert_eq!((scene.time.steps, scene.time.start, scene.particles.seed), (10, 0.0, 1));
+        assert_eq!((scene.time.steps, scene.time.start, scene.particles.seed), (10, None, 1));
         assert!(matches!(scene.space.unwrap().periodic, Periodic::All(false)) && scene.output.is_none());
         assert_eq!(scene.set["T"], Value::Number(1.0));
     }
@@ -259,6 +276,7 @@ mod tests {
             ("end = 1", "end = 1\nsteps = 0", "at least one"),
             ("n = 8", "", "needs n > 0"),
             ("lattice = \"cubic\"", "", "either file, or lattice"),
+            ("lattice = \"cubic\"", "file = \"a.vtu\"", "of a lattice"),
             ("n = 8", "n = 8\njitter = 2", "0 to 1"),
             ("[time]\nend = 1", "", "missing field `time`"),
             ("T = 1", "T = ", "line 9"),

@@ -9,28 +9,55 @@ use crate::io::{self, Snapshot};
 use crate::model::conductivity::LAWS;
 use crate::model::fields::{self, NUMBERS};
 use crate::solver::Solver;
-use crate::space::Domain;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// A scene's particles, ready to be stepped.
+pub struct Made {
+    pub solver: Solver,
+    pub exact: Option<Exact>,
+    /// What was taken from where, in words, where a reader of the scene may not expect it.
+    pub remarks: Vec<String>,
+}
+
 pub fn setup(scene: &Scene, folder: &Path) -> Result<(Solver, Option<Exact>)> {
+    make(scene, folder).map(|made| (made.solver, made.exact))
+}
+
+/// The same, with what is to be said about it.
+///
+/// # Errors
+/// Whatever is wrong with the scene or its files.
+pub fn make(scene: &Scene, folder: &Path) -> Result<Made> {
     let solver = Solver::new(&scene.words)?;
-    let mut setup = Setup { scene, snapshot: None, exact: None, x: Vec::new(), cell: None, solver };
+    let mut setup = Setup {
+        scene,
+        snapshot: None,
+        exact: None,
+        x: Vec::new(),
+        cell: None,
+        start: 0.0,
+        remarks: Vec::new(),
+        solver,
+    };
     known(scene.set.keys().chain(scene.mark.iter().flat_map(|mark| mark.set.keys())))?;
     setup.space()?;
     setup.particles(folder)?;
+    setup.start()?;
     setup.exact = setup.find_exact()?;
-    setup.solver.set_number("time", scene.time.start)?;
     setup.quantities()?;
-    for mark in &scene.mark {
+    for (number, mark) in scene.mark.iter().enumerate() {
         setup.weigh()?;
         let chosen = setup.chosen(&mark.place)?;
+        if mark.set.is_empty() || !chosen.contains(&true) {
+            return Err(setup.idle(number, mark.set.is_empty()));
+        }
         for (name, value) in &mark.set {
             setup.mark(name, value, &chosen)?;
         }
     }
     setup.weigh()?;
-    Ok((setup.solver, setup.exact))
+    Ok(Made { solver: setup.solver, exact: setup.exact, remarks: setup.remarks })
 }
 
 /// Every name is that of a quantity that can be set.
@@ -53,6 +80,9 @@ struct Setup<'a> {
     x: Vec<f64>,
     /// Volume of a particle of a lattice.
     cell: Option<f64>,
+    /// The time at which it starts.
+    start: f64,
+    remarks: Vec<String>,
     solver: Solver,
 }
 
@@ -72,9 +102,65 @@ impl Setup<'_> {
         }
     }
 
-    fn domain(&self) -> Result<Domain> {
-        let open = || Ok(Domain::open(self.solver.dim()));
-        self.scene.space.as_ref().map_or_else(open, |s| Domain::new(&s.lo, &s.hi, &self.periodic()))
+    /// When it starts: as the scene says, or else its file, or at 0.
+    fn start(&mut self) -> Result<()> {
+        let (said, file) = (self.scene.time.start, self.snapshot.as_ref().and_then(|s| s.time));
+        self.start = said.or(file).unwrap_or(0.0);
+        match (said, file) {
+            (Some(said), Some(file)) if said != file => {
+                self.remarks.push(format!("it starts at t = {said}, as the scene says; the file is of t = {file}"));
+            }
+            (None, Some(file)) if file != 0.0 => {
+                self.remarks.push(format!("it starts at t = {file}, the time of the file"))
+            }
+            _ => {}
+        }
+        self.scene.check_end(self.start)?;
+        self.solver.set_number("time", self.start)
+    }
+
+    /// Particles from a file. Of a snapshot's box, that of the scene takes the place.
+    fn from_file(&mut self, path: &Path) -> Result<()> {
+        let snapshot = io::read(path)?;
+        if snapshot.points.is_empty() {
+            let reason = "it holds no particles".into();
+            return Err(Error::BadFile { path: path.display().to_string(), reason });
+        }
+        let before = self.solver.domain().clone();
+        self.solver.set_snapshot(&snapshot)?;
+        let its = self.solver.domain().clone();
+        if its != before && self.scene.space.is_some() {
+            self.remarks.push("the [box] of the scene takes the place of the file's".into());
+            self.space()?;
+        } else if its != before {
+            self.remarks.push("the box is that of the file".into());
+        }
+        let frame = self.solver.frame();
+        self.remarks.extend(frame.about().map(|about| format!("the particles lie along {about}")));
+        self.x = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
+        self.snapshot = Some(snapshot);
+        Ok(())
+    }
+
+    /// What is wrong with a mark that does nothing.
+    fn idle(&self, number: usize, sets_nothing: bool) -> Error {
+        let what = format!("[[mark]] {}", number + 1);
+        if sets_nothing {
+            return Error::bad(&what, "without effect", "its set = {} names no quantity");
+        }
+        let dim = self.solver.dim();
+        let range = |axis: usize| {
+            let all = self.x.iter().skip(axis).step_by(dim);
+            let (low, high) = all.fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(*v), high.max(*v)));
+            format!("{} {low} to {high}", self.solver.frame().names()[axis])
+        };
+        let ranges: Vec<String> = (0..dim).map(range).collect();
+        let rule = format!(
+            "none of the {} particles fulfils all conditions of its where; they lie at {}",
+            self.solver.len(),
+            ranges.join(", ")
+        );
+        Error::bad(&what, "without particles", &rule)
     }
 
     /// (m/rho)^(1/nu)
@@ -88,10 +174,7 @@ impl Setup<'_> {
         let dim = self.solver.dim();
         let Particles { file, lattice: name, n, jitter, seed, glass, made } = &self.scene.particles;
         if let Some(file) = file {
-            let snapshot = io::read(folder.join(file))?;
-            self.solver.set_snapshot(&snapshot)?;
-            self.x = snapshot.points.iter().flat_map(|p| p[..dim].iter().copied()).collect();
-            self.snapshot = Some(snapshot);
+            self.from_file(&folder.join(file))?;
         } else if let (Some(name), Some(n), Some(space)) = (name, n, &self.scene.space) {
             let volume: f64 = space.lo.iter().zip(&space.hi).map(|(lo, hi)| hi - lo).product();
             let cell = |x: &[f64]| volume * dim as f64 / x.len() as f64;
@@ -183,13 +266,20 @@ impl Setup<'_> {
     /// What a text stands for, per particle: the exact solution at the start, or an array of the file.
     fn array(&self, name: &str, text: &str) -> Result<Vec<f64>> {
         if let Some(exact) = self.exact.as_ref().filter(|_| text == "exact") {
-            return Ok(at_all(exact, &self.x, self.solver.dim(), self.scene.time.start));
+            return Ok(at_all(exact, &self.x, self.solver.dim(), self.start));
         }
         let fields = || self.snapshot.iter().flat_map(|s| &s.fields);
         let field = fields().find(|f| f.name == text).ok_or_else(|| {
             let laws = LAWS.iter().filter(|_| name == "kappa").map(|(law, _)| *law);
             let exact = self.exact.iter().map(|_| "exact");
             let known: Vec<&str> = fields().map(|f| f.name.as_str()).chain(exact).chain(laws).collect();
+            if text.trim().parse::<f64>().is_ok() {
+                return Error::bad(name, format!("'{text}'"), "it is in quotes: write the number without them");
+            }
+            if known.is_empty() {
+                let rule = "a text names an array of the file, and the particles come from a lattice: give a number";
+                return Error::bad(name, format!("'{text}'"), rule);
+            }
             Error::unknown(&format!("array for {name}"), text, known)
         })?;
         if field.components != 1 {
@@ -214,7 +304,7 @@ impl Setup<'_> {
     }
 
     fn chosen(&mut self, place: &Where) -> Result<Vec<bool>> {
-        let mut chosen = choose::by_place(place, self.scene.space.as_ref(), &self.x, self.solver.dim())?;
+        let mut chosen = choose::by_place(place, self.scene.space.as_ref(), &self.x, self.solver.frame())?;
         let mut keep = |holds: &dyn Fn(usize) -> bool| {
             chosen.iter_mut().enumerate().for_each(|(i, chosen)| *chosen &= holds(i));
         };
@@ -228,7 +318,7 @@ impl Setup<'_> {
         }
         if let Some(wanted) = place.surface {
             let spacing = self.spacing()?;
-            let free = surface::free(&self.domain()?, &self.x, &spacing)?;
+            let free = surface::free(self.solver.domain(), &self.x, &spacing)?;
             keep(&|i| free[i] == wanted);
         }
         Ok(chosen)
@@ -304,7 +394,14 @@ mod tests {
             ("[[mark]]\nwhere = { field = \"type\" }\nset = { T = 1 }", "go together"),
             ("[[mark]]\nwhere = {}\nset = { kappa = -1 }", "kappa[0] is -1"),
             ("[[mark]]\nwhere = {}\nset = { kappa = \"power n=2\" }", "for all particles"),
-            ("[[mark]]\nwhere = {}\nset = { T = \"teperature\" }", "unknown array for T"),
+            ("[[mark]]\nwhere = {}\nset = { T = \"teperature\" }", "come from a lattice"),
+            ("[[mark]]\nwhere = {}\nset = { T = \"300\" }", "without them"),
+            ("[[mark]]\nwhere = {}\nset = {}", "[[mark]] 1 is without effect"),
+            (
+                "[[mark]]\nwhere = {}\nset = { T = 2 }\n[[mark]]\nwhere = { x = [3, 4] }\nset = { T = 1 }",
+                "[[mark]] 2 is without particles; none of the 200",
+            ),
+            ("[[mark]]\nwhere = {}\nset = { emissivity = 5 }", "from 0 to 1"),
             ("[[mark]]\nwhere = {}\nset = { time = 1 }", "in [time]"),
             ("[[mark]]\nwhere = {}\nset = { kappa = \"pwer\" }", "did you mean 'power'"),
             ("[exact]\nname = \"sin\"", "did you mean 'sine'"),

@@ -5,6 +5,7 @@ use crate::array::Strided;
 use crate::error::Result;
 use crate::integrator::Method;
 use crate::operator::table;
+use crate::plan::applies::fitting;
 use crate::solver::Solver;
 use crate::study::lattice;
 use crate::words::replaced;
@@ -35,7 +36,7 @@ impl Setting {
 
     /// A solver without particles.
     pub fn solver(&self, dim: usize, more: &str) -> Result<Solver> {
-        Solver::new(&format!("heat dim={dim} threads={} {} {more}", self.threads, self.words))
+        Solver::new(&fitting(&format!("heat dim={dim} threads={} {} {more}", self.threads, self.words)))
     }
 
     /// Particles of total mass 1, rho = 1 and kappa = 1 in the unit box, periodic or open.

@@ -5,6 +5,7 @@ use crate::kernel::{self, Kernel};
 use crate::model::fields::{FIELDS, TENSOR};
 use crate::operator::Operator;
 use crate::operator::table::OPERATORS;
+use crate::plan::applies::fitting;
 use crate::study::catalogue::Request;
 use crate::study::mode::isotropic;
 use crate::study::scene::Scene;
@@ -71,7 +72,7 @@ impl Choice {
         let mut scene = scene.clone();
         let Choice { operator, kernel, h_fac, integrator, n } = self;
         let words = format!("operator={operator} kernel={kernel} h_fac={h_fac} integrator={integrator}");
-        scene.words = replaced(&scene.words, &words, &["normalise"]);
+        scene.words = fitting(&replaced(&scene.words, &words, &["normalise"]));
         scene.particles.n = *n;
         scene
     }

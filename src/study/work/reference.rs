@@ -4,6 +4,7 @@
 
 use super::choices::{Choice, has_tensor};
 use crate::error::{Error, Result};
+use crate::plan::applies::fitting;
 use crate::study::norm::l2;
 use crate::study::recommend;
 use crate::study::run::{Field, Known, Study};
@@ -47,7 +48,7 @@ impl Reference {
             Some(n) => finer(scene, folder, n),
             None => {
                 let (mut solver, _) = setup(scene, folder)?;
-                let dt = scene.time.end - scene.time.start;
+                let dt = scene.time.end - solver.get_number("time")?;
                 let recommend::Reference { t, error, about } =
                     recommend::Reference::of(&mut solver, dt, EXACT_IN_TIME)?;
                 Ok(Reference::Same { t: Rc::new(t), error, about: format!("{about} on the same particles") })
@@ -123,6 +124,6 @@ fn level(scene: &Scene, folder: &Path, n: u32, power: i32, words: &str) -> Resul
     let mut scene = scene.clone();
     scene.output = None;
     scene.particles.n = Some((f64::from(n) * RATIO.powi(power)).round() as u32);
-    scene.words = replaced(&scene.words, words, &["stages", "normalise"]);
+    scene.words = fitting(&replaced(&scene.words, words, &["stages", "normalise"]));
     Study::new(scene, folder)?.field()
 }
