@@ -432,12 +432,7 @@ fn rod(words: &str, n: usize, t: f64) -> f64 {
 
 #[test]
 fn one_fixed_particle_holds_an_end() {
-    for words in [
-        "",
-        "kernel=M4",
-        "kernel=C2 operator=kernel",
-        "operator=consistent kernel=C2 h_fac=1.6",
-    ] {
+    for words in ["", "kernel=M4", "kernel=C2 operator=kernel", "operator=consistent kernel=C2 h_fac=1.6"] {
         let consistent = words.contains("consistent");
         let integrator = if consistent { "rkl2 tolerance=1e-7" } else { "sdirk2 tolerance=1e-6" };
         let error = |n: usize, t: f64| rod(&format!("{words} integrator={integrator}"), n, t);
@@ -445,7 +440,10 @@ fn one_fixed_particle_holds_an_end() {
         println!("{words} integrator={integrator}: {coarse:.1e} {fine:.1e}, at last {steady:.0e}");
         // A straight line is exact but for what sub-steps leave; on the way there, second order (and consistent weights
         // of fourth order need no help).
-        assert!(steady < 1e-6 && fine < 1e-3 && (consistent || fine < coarse / 3.0), "{words}: {coarse:e} {fine:e} {steady:e}");
+        assert!(
+            steady < 1e-6 && fine < 1e-3 && (consistent || fine < coarse / 3.0),
+            "{words}: {coarse:e} {fine:e} {steady:e}"
+        );
     }
 }
 
@@ -470,7 +468,13 @@ fn walls_of_one_layer_are_smooth_bounded_and_symmetric() {
             let off = x.chunks(dim).zip(s.get_all("T").unwrap()).map(|(p, t)| (t - p[0]).abs()).fold(0.0, f64::max);
             println!("{dim}-D jitter {jitter} open {open}: {:.1e} spacings", off * n as f64);
             // In spacings. Where a wall meets an open face, what lies behind the wall is not told from what the face lacks.
-            let most = if open { 0.5 } else if jitter > 0.0 { 0.4 } else { 1e-6 };
+            let most = if open {
+                0.5
+            } else if jitter > 0.0 {
+                0.4
+            } else {
+                1e-6
+            };
             assert!(off * (n as f64) < most, "{dim} {jitter} {open}: {off}");
             // Symmetric among the free ones.
             let (n, mut random) = (x.len() / dim, Random(4));
