@@ -186,7 +186,7 @@ fn growth_is_refused_whatever_else_the_scene_has() {
         |_, _| (),
         |s, x| set(s, "fixed", &field(x, 2, |p| f64::from(p[0] < 0.05))),
         |s, _| s.set_number("source", 1.0).unwrap(),
-        |s, _| s.set_number("h_conv", 1.0).unwrap(),
+        |s, _| ["h_conv", "area"].iter().for_each(|name| s.set_number(name, 1.0).unwrap()),
     ];
     for set_up in set_ups {
         let error = scene("", set_up).unwrap_err().to_string();
@@ -277,6 +277,7 @@ fn where_nothing_changes_a_step_is_one() {
     }
     // In equilibrium with what surrounds it.
     s.set_number("h_conv", 3.0).unwrap();
+    s.set_number("area", 0.1).unwrap();
     s.set_number("T_ambient", 300.0).unwrap();
     assert_eq!(s.step(1e6).unwrap().substeps, 1);
     // A last digit of noise, heated as a whole, costs little more than the heating.
@@ -363,7 +364,7 @@ fn a_body_that_radiates_alone_follows_its_equation() {
     for rate in [1.0, 1e3, 1e6] {
         for (words, tolerance) in [("", 5e-3), ("integrator=sdirk2 tolerance=1e-5", 1e-3)] {
             let mut s = unit_box(words, &x, 2, true);
-            let numbers = [("T", 1.0), ("emissivity", 1.0), ("area", 1.0 / 16.0), ("sigma_SB", rate)];
+            let numbers = [("T", 1.0), ("emissivity", 1.0), ("area", 1.0 / 16.0), ("depth", 0.0), ("sigma_SB", rate)];
             numbers.iter().for_each(|(name, value)| s.set_number(name, *value).unwrap());
             let t = s.step(1.0).unwrap_or_else(|e| panic!("{words} {rate}: {e}")).t_min;
             let exact = (1.0 + 3.0 * rate).powf(-1.0 / 3.0);

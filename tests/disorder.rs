@@ -1,4 +1,4 @@
-//! What disorder and free surfaces do to the operators, and why `normalise=pair` is the default: on lattices, jittered
+//! What disorder and free surfaces do to the operators, and why weights of pairs are normalised: on lattices, jittered
 //! lattices, a glass and a dam break, with real particles from another code (tests/data).
 
 mod particles;

@@ -18,8 +18,10 @@ fn for_all(mut visit: impl FnMut(&str, &str, &str, usize)) {
     for dim in 1..=3 {
         for kernel in names("kernels") {
             for operator in names("operators") {
-                // There is nothing to normalise where second moments are exact.
-                for normalise in ["pair", "none"].into_iter().skip(usize::from(operator == "consistent")) {
+                // Consistent weights take none.
+                let all: &[&str] = if dim == 2 { &["tensor", "pair", "none"] } else { &["tensor", "none"] };
+                let by = if operator == "consistent" { &["none"][..] } else { all };
+                for normalise in by {
                     visit(&kernel, &operator, normalise, dim);
                 }
             }
@@ -96,7 +98,8 @@ fn a_parabola_gives_the_second_moment() {
         let k = s.get_all("K_d2").unwrap()[centre];
         // Gradients that are exact for linear fields, and their adjoint, are right where the lattice is regular.
         // Those of all particles are found together, and reach the centre from the edges.
-        let exact = (normalise == "pair" && operator != "projected") || ["two-first", "limited"].contains(&operator);
+        let exact = (normalise != "none" && !["projected", "monotone"].contains(&operator))
+            || ["two-first", "limited"].contains(&operator);
         let expected = if exact { 2.0 } else { 2.0 * k };
         // Terms of order 1/h² ~ n² cancel down to 2.
         assert!((rate - expected).abs() < 1e-10, "{words} dim {dim}: {rate} {expected}");
@@ -282,6 +285,43 @@ fn few_lonely_and_coincident_particles() {
     assert!(t.iter().all(|t| t.is_finite()) && (report.energy / report.energy_before - 1.0).abs() < 1e-12);
     // Each group has met: the five of one place are as warm as each other.
     assert!((t[0] - t[1]).abs() < 1e-6 && (t[3] - t[5]).abs() < 1e-6, "{t:?}");
+}
+
+#[test]
+fn volumes_that_do_not_fit_the_distances_are_refused() {
+    let x = lattice(8, 3, 0.2);
+    let made = |words: &str, rho: f64, x: &[f64]| {
+        let mut s = unit_box(words, x, 3, true);
+        s.set_number("rho", rho).unwrap();
+        set(&mut s, "T", &field(x, 3, |p| p[0]));
+        s
+    };
+    for (words, rho, what) in
+        [("", 1e3, "has 0 neighbours"), ("h_fac=0.1", 1.0, "has 0 neighbours"), ("", 1e-3, "neighbours")]
+    {
+        let mut s = made(words, rho, &x);
+        let e = s.step(1e-3).unwrap_err();
+        assert!(e.name() == "BAD_VALUE" && e.to_string().contains("K_d2["), "{e}");
+        assert!(e.to_string().contains(what) && e.to_string().contains("allow=volumes"), "{e}");
+        assert_eq!(s.get_all("T").unwrap(), field(&x, 3, |p| p[0]));
+        made(&format!("{words} allow=unstable,volumes"), rho, &x).step(1e-3).unwrap();
+    }
+    // With h as it should be, rho alone is wrong.
+    let mut s = made("", 1e3, &x);
+    s.set_number("h", 0.125).unwrap();
+    assert!(s.step(1e-3).unwrap_err().to_string().contains("K_d2["));
+    // Right, thin (a line in 3-D), sparse, or few: nobody's business.
+    let line: Vec<f64> = (0..30).flat_map(|i| [f64::from(i) / 30.0, 0.5, 0.5]).collect();
+    made("", 30.0f64.powi(2), &line).step(1e-6).unwrap();
+    let half: Vec<f64> = x.iter().enumerate().map(|(k, x)| if k / 3 % 3 == 0 { *x } else { 0.25 * x }).collect();
+    let mut s = made("", 12.0, &half);
+    s.set_number("h", 0.04).unwrap();
+    assert!(s.get_all("neighbours").unwrap().iter().filter(|n| **n == 0.0).count() > 50);
+    s.step(1e-6).unwrap();
+    made("h_fac=0.01", 1.0, &lattice(2, 3, 0.2)).step(1e-3).unwrap();
+    for wrong in ["allow=volume", "allow=unstable,"] {
+        assert!(Solver::new(&format!("heat {wrong}")).is_err());
+    }
 }
 
 #[test]

@@ -5,9 +5,12 @@ mod particles;
 use diffusph::kernel::Kernel;
 use diffusph::model::fields;
 use diffusph::model::heat::{Conductivity, Release};
+use diffusph::operator::Normalise;
 use diffusph::operator::table::{OPERATORS, Operator, Tensor};
+use diffusph::plan::given::Offer;
+use diffusph::plan::input::Input;
 use diffusph::plan::rules::{self, RULES, Rule, Same};
-use diffusph::plan::state::{Input, State};
+use diffusph::plan::state::State;
 use diffusph::plan::{Choices, Plan};
 use diffusph::{Solver, Strided};
 use particles::*;
@@ -176,7 +179,7 @@ static COUNTED: Operator = Operator {
     name: "counted",
     about: "Brookshaw's weights, counted",
     positive: true,
-    normalise: true,
+    normalise: Normalise::Pair,
     dissipative: true,
     tensor: Tensor::Angular(|along, nu| {
         ANGLES.fetch_add(1, Ordering::Relaxed);
@@ -197,13 +200,14 @@ fn state(words: &str, counted: bool, each: bool) -> (State, Plan) {
         choices.operator = &COUNTED;
     }
     let mut state = State::new(choices).unwrap();
-    state.set_box(diffusph::space::Domain::new(&[0.0; 2], &[1.0; 2], &[true; 2]).unwrap()).unwrap();
-    state.set_positions(Strided::new("x", &x, n, 2, 2).unwrap()).unwrap();
+    let domain = diffusph::space::Domain::new(&[0.0; 2], &[1.0; 2], &[true; 2]).unwrap();
+    let x = Strided::new("x", &x, n, 2, 2).unwrap();
+    state.accept(&Offer { domain, x, given: &[], energy: None, anew: false }).unwrap();
     for (slot, value) in [(fields::M, 1.0 / n as f64), (fields::RHO, 1.0), (fields::KAPPA, 1.0), (fields::T, 1.0)] {
-        state.put(slot, Input::Number(value));
+        state.put(slot, Input::Number(value)).unwrap();
     }
     if each {
-        state.put(fields::KAPPA, Input::Each((0..n).map(|i| 1.0 + i as f64).collect()));
+        state.put(fields::KAPPA, Input::Each((0..n).map(|i| 1.0 + i as f64).collect())).unwrap();
     }
     let plan = state.prepare("a test").unwrap();
     (state, plan)
@@ -223,7 +227,7 @@ fn inside(rule: &Rule, without: &str) -> u64 {
     if is(&rules::KEEP_MATRIX) {
         // Levels that a step finds.
         let (mut state, _) = state(&format!("integrator=sdirk2 {words}"), false, false);
-        state.put(fields::T, Input::Each((0..state.len()).map(|i| i as f64).collect()));
+        state.put(fields::T, Input::Each((0..state.len()).map(|i| i as f64).collect())).unwrap();
         state.step(1e-2).unwrap();
         let plan = state.prepare("a test").unwrap();
         let lacks = state.with_motion(&plan, |m| Ok(m.heat.multigrid.as_ref().is_none_or(|m| m.is_empty())));

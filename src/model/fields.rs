@@ -107,7 +107,12 @@ pub static FIELDS: &[Field] = &[
     output("u", "J/kg", "energy per mass, c_v T; setting it sets T"),
     output("rate", "W/kg", "du/dt from diffusion, surface and source"),
     output("dT_dt", "K/s", "dT/dt; 0 where T is fixed"),
-    output("K_d2", "-", "second moment of the operator (1 for a perfect Laplacian)"),
+    output("K_d2", "-", "second moment of the operator before normalisation (1 for a perfect Laplacian)"),
+    output(
+        "conduction_defect",
+        "-",
+        "how wrong a particle conducts: |second moments of the weights in use - I|/sqrt(nu), all directions counted",
+    ),
     vector(output("first_moment", "-", "h times the first moment of the operator (0 for a perfect Laplacian)")),
     output("neighbours", "-", "number of neighbours"),
     output(
@@ -197,6 +202,12 @@ pub static NUMBERS: &[Number] = &[
     result("negative_pairs", "-", "pairs with a negative weight, both directions counted"),
     result("K_d2_min", "-", "smallest second moment of the operator"),
     result("K_d2_max", "-", "largest second moment of the operator"),
+    result("conduction_defect", "-", "root mean square of the field of this name"),
+    result(
+        "energy_defect",
+        "-",
+        "energy that operator=consistent has made or lost since T was set, of what was out of balance, sum of m c_v |T - mean|; 0 for others, and where something heats, cools or is fixed",
+    ),
     result(
         "bypassed",
         "-",

@@ -6,6 +6,7 @@ use super::Mean;
 use crate::error::Result;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
+use crate::space::{Row, Scratch, rows::Rows};
 use std::ops::Range;
 
 /// Pairs from the one at work to the one whose coefficient is asked of the memory: enough to hide its latency, which the
@@ -13,10 +14,6 @@ use std::ops::Range;
 /// 0.8 times the time of asking for a row at once. Half or twice as far takes up to 1.08 times as long, four times as
 /// far 1.2 and more (50³ and 100³ particles).
 const AHEAD: usize = 256;
-
-/// K_a below which a particle counts as having too few neighbours for its weights to be normalised: scaling them up
-/// by more than this would make a lone pair as stiff as it is meaningless.
-const LEAST_MOMENT: f64 = 0.1;
 
 /// Symmetric coefficients g_ab = V_a V_b w_ab (and what was folded into them), in rows.
 pub struct Matrix {
@@ -160,15 +157,34 @@ impl Matrix {
         });
     }
 
-    /// Scales pairs by the mean of 1/K_a and 1/K_b.
+    /// Calls `change` with each row that is `wanted`, found again, and its coefficients. `B` is what a worker reuses from row
+    /// to row.
     ///
     /// # Errors
-    /// `NoMemory`.
-    pub fn normalise(&mut self, pool: &Pool, moments: &[f64]) -> Result<()> {
-        let half = memory::collected("normalisation", moments.iter().map(|&k| 0.5 / k.max(LEAST_MOMENT)))?;
-        let half = &half[..];
-        self.scale(pool, move |a, b| half[a] + half[b]);
-        Ok(())
+    /// `NoMemory`; that of `change`.
+    pub fn update_rows<B: Default>(
+        &mut self,
+        rows: &Rows,
+        pool: &Pool,
+        wanted: impl Fn(usize) -> bool + Sync + Send,
+        change: impl Fn(&mut B, &Row, &mut [f64]) -> Result<()> + Sync + Send,
+    ) -> Result<()> {
+        let failed = std::sync::Mutex::new(None);
+        pool.chunks(&mut self.blocks, 1, |_, part| {
+            for Block { first, start, coef, .. } in part {
+                let (mut buffers, mut inner, range) = (B::default(), Ok(()), *first..*first + start.len() - 1);
+                let found = rows.visit_where(range, &mut Scratch::default(), &wanted, |row| {
+                    let from = start[row.i - *first] as usize;
+                    if let Err(e) = change(&mut buffers, &row, &mut coef[from..from + row.len()]) {
+                        inner = Err(e);
+                    }
+                });
+                if let (Err(e), Ok(mut slot)) = (found.and(inner), failed.lock()) {
+                    *slot = Some(e);
+                }
+            }
+        });
+        failed.into_inner().ok().flatten().map_or(Ok(()), Err)
     }
 
     /// out_a = finish(a, Σ_b g_ab mean(k_a, k_b) (T_b − T_a)), the mean left out where `kappa` is none.
@@ -246,24 +262,26 @@ impl Matrix {
         &self.blocks[i / BLOCK].coef[self.places(i)]
     }
 
-    /// Replaces each coefficient by the mean of itself and its mate's, g_ba. Rows must list each other.
+    /// Replaces each coefficient by the mean of itself and its mate's, g_ba. Rows must list each other. `apart`: what is
+    /// between the particles of each pair, where some are neighbours with several images; the mate of the image at d is the
+    /// one at −d.
     ///
     /// # Errors
     /// `NoMemory`.
-    pub fn symmetrise(&mut self, pool: &Pool) -> Result<()> {
+    pub fn symmetrise(&mut self, apart: Option<&[Vec<[f32; 3]>]>, pool: &Pool) -> Result<()> {
+        let between = |i: usize, at: usize| apart.map_or([0.0; 3], |apart| apart[i / BLOCK][at]);
         let made = pool.map(self.blocks.len(), |b| {
             let block = &self.blocks[b];
             let mut coef = memory::copied("matrix coefficients", &block.coef)?;
             for k in 0..block.len() {
                 let (i, range) = block.row(k);
                 for at in range {
-                    // The n-th image of b in a's row is the mate of the n-th of a in b's: their sums are what counts.
-                    let j = block.col[at];
-                    let before = self.columns(i)[..at - block.start[k] as usize].iter().filter(|c| **c == j).count();
-                    let mut mates = self.columns(j as usize).iter().zip(self.coefficients(j as usize));
-                    if let Some((_, mate)) = mates.by_ref().filter(|(c, _)| **c as usize == i).nth(before) {
-                        coef[at] = 0.5 * (coef[at] + mate);
-                    }
+                    let (j, back) = (block.col[at] as usize, between(i, at).map(|d| -d));
+                    let mut mates = self.columns(j).iter().zip(self.coefficients(j)).zip(self.places(j));
+                    let is_mate = |place: usize, c: u32| c as usize == i && between(j, place) == back;
+                    let mate = mates.find(|((c, _), place)| is_mate(*place, **c)).map(|((_, mate), _)| mate);
+                    debug_assert!(mate.is_some(), "particles {i} and {j} do not list each other");
+                    coef[at] = mate.map_or(coef[at], |mate| 0.5 * (coef[at] + mate));
                 }
             }
             Ok(coef)

@@ -14,6 +14,7 @@
 //! takes a gradient, a flux and a divergence ([`twice`]).
 
 pub mod aggregate;
+mod apart;
 pub mod arnoldi;
 pub mod bypass;
 pub mod consistent;
@@ -23,6 +24,7 @@ pub mod matrix;
 pub mod mean;
 pub mod moments;
 pub mod multigrid;
+pub mod normalise;
 pub mod once;
 mod polynomials;
 mod projected;
@@ -37,6 +39,7 @@ pub mod walls;
 pub use matrix::Matrix;
 pub use mean::Mean;
 pub use multigrid::Multigrid;
+pub use normalise::Normalise;
 pub use once::{Assembly, Pairs};
 pub use table::Operator;
 pub use tensor::Sym;

@@ -3,7 +3,9 @@
 //! agree afterwards.)
 
 use super::Matrix;
+use super::normalise::{self, Normals};
 use super::once::{Assembly, Buffers};
+use super::tensor;
 use crate::error::Result;
 use crate::memory;
 use crate::pool::Pool;
@@ -30,12 +32,37 @@ pub fn first(assembly: &Assembly, stored: Option<&Matrix>, pool: &Pool) -> Resul
     Ok(out)
 }
 
-/// K_a = Σ_b V_b r² w_ab / (2 nu) of each particle, from stored coefficients g_ab = V_a V_b w_ab.
-pub fn second(assembly: &Assembly, matrix: &Matrix, pool: &Pool) -> Result<Vec<f64>> {
-    let mut out = memory::filled("second moments", assembly.volume.len(), 0.0)?;
+/// K_a = Σ_b V_b r² w_ab / (2 nu) of each particle, and what it is normalised by, from stored coefficients
+/// g_ab = V_a V_b w_ab.
+pub fn normals(assembly: &Assembly, matrix: &Matrix, pool: &Pool) -> Result<Normals> {
+    let n = assembly.volume.len();
+    let mut moments = memory::filled("second moments", n, 0.0)?;
     let nu = assembly.kernel.dim() as f64;
-    assembly.rows.map(pool, &mut out, |_: &mut (), row: Row| {
+    assembly.rows.map(pool, &mut moments, |_: &mut (), row: Row| {
         Ok(of_row(matrix.coefficients(row.i), row.r) / (2.0 * nu * assembly.volume[row.i]))
+    })?;
+    let mut tensors = memory::filled("second moments", if assembly.turns_pairs() { n } else { 0 }, [0.0; 6])?;
+    if assembly.turns_pairs() {
+        let tensor = |_: &mut (), row: Row| Ok(normalise::tensor_of(assembly, &row, matrix.coefficients(row.i)));
+        assembly.rows.map(pool, &mut tensors, tensor)?;
+    }
+    Ok(Normals { moments, tensors, ..Normals::default() })
+}
+
+/// How wrong each particle conducts: |Σ_b V_b w_ab d dᵀ/2 − S|/√nu, S being I unless the operator takes a tensor kappa, from
+/// stored coefficients; 0 for a perfect Laplacian.
+pub fn conduction(assembly: &Assembly, matrix: &Matrix, pool: &Pool) -> Result<Vec<f64>> {
+    let mut out = memory::filled("second moments", assembly.volume.len(), 0.0)?;
+    let nu = assembly.kernel.dim();
+    assembly.rows.map(pool, &mut out, |_: &mut (), row: Row| {
+        let (g, scale) = (matrix.coefficients(row.i), 0.5 / assembly.volume[row.i]);
+        let shape = assembly.shape.filter(|_| assembly.operator.turns_weights());
+        let wanted = shape.map_or(tensor::unit(nu), |shape| shape[row.i]);
+        let squares = tensor::AXES.iter().zip(wanted).filter(|([_, l], _)| *l < nu).map(|(&[k, l], wanted)| {
+            let off = scale * sum::product(g, row.d[k], row.d[l]) - wanted;
+            off * off * if k == l { 1.0 } else { 2.0 }
+        });
+        Ok((squares.sum::<f64>() / nu as f64).sqrt())
     })?;
     Ok(out)
 }

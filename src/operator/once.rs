@@ -5,20 +5,23 @@
 //! sums. Rows are gathered by their owner in a fixed order.
 
 use super::matrix::{Block, Matrix, Seen, row_sum};
-use super::table::Tensor;
+use super::normalise::{self, Normalise, Normals};
+use super::table::{self, Tensor};
 use super::tensor::{self, Sym};
 use super::twice::Twice;
-use super::{Mean, Operator, consistent, moments, projected, stencils};
+use super::{Mean, Operator, apart, consistent, moments, projected, stencils};
 use crate::error::Result;
 use crate::kernel::Kernel;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
 use crate::space::{Row, Scratch, rows::Rows};
+use crate::sum;
 
 /// What a row of weights is made from.
 #[derive(Clone, Copy)]
 pub struct Assembly<'a> {
     pub operator: &'static Operator,
+    pub normalise: Normalise,
     pub kernel: &'a Kernel,
     pub rows: &'a Rows<'a>,
     /// Volumes m/rho in internal order.
@@ -92,35 +95,112 @@ impl Assembly<'_> {
         }
     }
 
-    /// The stored matrix, and the local second moment K_a = Σ_b V_b r² w_ab / (2 nu) of each particle, which is 1 for
-    /// a perfect Laplacian (Biriukov & Price 2019).
+    /// The stored matrix, not normalised yet, and what [`normalise::scale`] needs for that: the local second moment
+    /// K_a = Σ_b V_b r² w_ab / (2 nu) of each particle, which is 1 for a perfect Laplacian (Biriukov & Price 2019), and
+    /// beyond.
     ///
     /// # Errors
     /// `NoMemory`.
-    pub fn store(&self, pool: &Pool) -> Result<(Matrix, Vec<f64>)> {
+    pub fn store(&self, pool: &Pool) -> Result<(Matrix, Normals)> {
         let n = self.volume.len();
         let mut blocks = memory::reserved("matrix", n.div_ceil(BLOCK))?;
-        let mut moments = memory::reserved("second moments", n)?;
+        let mut normals = Normals {
+            moments: memory::reserved("second moments", n)?,
+            tensors: memory::reserved("second moments", if self.turns_pairs() { n } else { 0 })?,
+            paired: memory::reserved("rows", if self.is_consistent() { n } else { 0 })?,
+            defect: None,
+        };
         for block in pool.map_init(n.div_ceil(BLOCK), Workspace::default, |space, b| self.block(space, b)) {
             let (block, k) = block?;
             blocks.push(block);
-            moments.extend_from_slice(&k);
+            normals.moments.extend_from_slice(&k.moments);
+            normals.tensors.extend_from_slice(&k.tensors);
+            normals.paired.extend_from_slice(&k.paired);
         }
         let mut matrix = Matrix::new(n, blocks);
         match self.operator.tensor {
-            Tensor::Stencils => {
-                matrix.symmetrise(pool)?;
-                matrix.normalise(pool, &moments::second(self, &matrix, pool)?)?;
+            Tensor::Stencils | Tensor::Projected => {
+                if matches!(self.operator.tensor, Tensor::Stencils) {
+                    self.symmetrise(&mut matrix, pool)?;
+                    normals = moments::normals(self, &matrix, pool)?;
+                }
+                normalise::scale(self, &mut matrix, &normals, pool)?;
                 projected::project(self, &mut matrix, pool)?;
+                let unmet = moments::conduction(self, &matrix, pool)?;
+                let defect = Some(sum::rms(pool, unmet.len(), |_| 1.0, |i| unmet[i]));
+                normals = Normals { defect, ..moments::normals(self, &matrix, pool)? };
             }
-            Tensor::Projected => {
-                matrix.normalise(pool, &moments)?;
-                projected::project(self, &mut matrix, pool)?;
+            Tensor::Consistent if normals.paired.contains(&true) => {
+                self.pair_up(&mut matrix, &normals.paired, pool)?;
+                normals = moments::normals(self, &matrix, pool)?;
             }
-            _ => return Ok((matrix, moments)),
+            _ => {}
         }
-        moments = moments::second(self, &matrix, pool)?;
-        Ok((matrix, moments))
+        Ok((matrix, normals))
+    }
+
+    /// Normalises what [`Assembly::store`] made, where that is not done yet.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn normalise(&self, matrix: &mut Matrix, normals: &Normals, pool: &Pool) -> Result<()> {
+        match self.operator.tensor {
+            Tensor::Stencils | Tensor::Projected => Ok(()),
+            _ => normalise::scale(self, matrix, normals, pool),
+        }
+    }
+
+    /// Whether rows are to be normalised by direction.
+    pub fn turns_pairs(&self) -> bool {
+        self.normalise == Normalise::Tensor && self.kernel.dim() > 1
+    }
+
+    fn is_consistent(&self) -> bool {
+        matches!(self.operator.tensor, Tensor::Consistent)
+    }
+
+    /// Puts normalised pairs into some rows.
+    fn pair_up(&self, matrix: &mut Matrix, paired: &[bool], pool: &Pool) -> Result<()> {
+        let operator = table::find("brookshaw")?;
+        let pairs = Assembly { operator, normalise: Normalise::Tensor, shape: None, ..*self };
+        let mut met = memory::filled("rows", paired.len(), false)?;
+        for i in (0..paired.len()).filter(|&i| paired[i]) {
+            met[i] = true;
+            matrix.columns(i).iter().for_each(|&j| met[j as usize] = true);
+        }
+        let mut tensors = memory::filled("second moments", paired.len(), [0.0; 6])?;
+        self.rows.map(pool, &mut tensors, |(buffers, g): &mut (Buffers, Vec<f64>), row: Row| {
+            if !met[row.i] {
+                return Ok([0.0; 6]);
+            }
+            memory::extended("a row of weights", g, row.len(), 0.0)?;
+            pairs.fill(&row, buffers, &mut g[..row.len()])?;
+            Ok(normalise::tensor_of(&pairs, &row, &g[..row.len()]))
+        })?;
+        matrix.update_rows(
+            self.rows,
+            pool,
+            |i| paired[i],
+            |buffers: &mut Buffers, row, g| {
+                pairs.fill(row, buffers, g)?;
+                normalise::of_row(self.kernel.dim(), row, &tensors, g);
+                Ok(())
+            },
+        )
+    }
+
+    /// g_ab of a row.
+    fn fill(&self, row: &Row, buffers: &mut Buffers, g: &mut [f64]) -> Result<()> {
+        let w = self.weights(row, buffers)?;
+        g.iter_mut().zip(self.coefficients(row, w)).for_each(|(g, made)| *g = made);
+        Ok(())
+    }
+
+    fn symmetrise(&self, matrix: &mut Matrix, pool: &Pool) -> Result<()> {
+        if self.rows.nearest::<3>().is_some() {
+            return matrix.symmetrise(None, pool);
+        }
+        matrix.symmetrise(Some(&apart::of(self.rows, self.rows.largest(), pool)?), pool)
     }
 
     /// As [`Matrix::apply`], with weights that are made for this one application and not kept: the same bits.
@@ -154,14 +234,19 @@ impl Assembly<'_> {
         row.j.iter().zip(w).map(move |(&j, w)| (own * volume[j as usize]) * w)
     }
 
-    fn block(&self, space: &mut Workspace, b: usize) -> Result<(Block, Vec<f64>)> {
+    fn block(&self, space: &mut Workspace, b: usize) -> Result<(Block, Normals)> {
         let range = b * BLOCK..((b + 1) * BLOCK).min(self.volume.len());
         let Workspace { scratch, buffers, seen, pairs } = space;
         // Made in place, in as much room as the last block took: a copy would cost as much as the weights themselves.
         let mut col = memory::reserved("matrix columns", *pairs)?;
         let mut coef = memory::reserved("matrix coefficients", *pairs)?;
         let mut start = memory::reserved("matrix rows", range.len() + 1)?;
-        let mut k = memory::reserved("second moments", range.len())?;
+        let mut normals = Normals {
+            moments: memory::reserved("second moments", range.len())?,
+            tensors: memory::reserved("second moments", if self.turns_pairs() { range.len() } else { 0 })?,
+            paired: memory::reserved("rows", if self.is_consistent() { range.len() } else { 0 })?,
+            defect: None,
+        };
         let mut failed = Ok(());
         let dim = self.kernel.dim() as f64;
         start.push(0);
@@ -174,12 +259,18 @@ impl Assembly<'_> {
             let from = col.len();
             col.extend_from_slice(row.j);
             coef.extend(self.coefficients(&row, w));
-            k.push(moments::of_row(&coef[from..], row.r) / (2.0 * dim * self.volume[row.i]));
+            normals.moments.push(moments::of_row(&coef[from..], row.r) / (2.0 * dim * self.volume[row.i]));
+            if self.turns_pairs() {
+                normals.tensors.push(normalise::tensor_of(self, &row, &coef[from..]));
+            }
+            if self.is_consistent() {
+                normals.paired.push(buffers.order == 0);
+            }
             start.push(col.len() as u32);
         })?;
         failed?;
         *pairs = col.len() + col.len() / 64;
-        Ok((Block::new(self.volume.len(), b, start, col, coef, seen)?, k))
+        Ok((Block::new(self.volume.len(), b, start, col, coef, seen)?, normals))
     }
 }
 

@@ -11,13 +11,12 @@
 //! Where neighbours are on one side, at a free surface, the conditions cannot hold, and insulation is natural: there λ
 //! stays 0.
 
-use super::Matrix;
 use super::once::Assembly;
 use super::tensor::{self, Sym};
+use super::{Matrix, apart};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
-use crate::space::{Scratch, rows::Rows};
 use crate::sum;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
@@ -32,7 +31,7 @@ const ONE_SIDED: f64 = 0.02;
 /// Below this ratio of a pivot to its diagonal neighbours do not tell the moments apart.
 const FLAT: f64 = 1e-6;
 
-/// Projects the pair-normalised weights of a positive operator.
+/// Projects the normalised weights of a positive operator.
 ///
 /// # Errors
 /// `NoMemory`.
@@ -54,29 +53,14 @@ pub fn bytes(dim: usize) -> [f64; 2] {
 fn project_in<const D: usize, const C: usize>(assembly: &Assembly, matrix: &mut Matrix, pool: &Pool) -> Result<()> {
     let n = matrix.len();
     let unit = sum::max(pool, n, |i| assembly.rows.h[i]);
-    let apart = offsets(assembly.rows, unit, pool)?;
+    // Single precision holds the conditions to 1e-7.
+    let apart = apart::of(assembly.rows, unit, pool)?;
     let shape = assembly.shape.filter(|_| assembly.operator.takes_tensors());
     let problem = Problem::<D, C> { pool, prior: matrix, apart: &apart, volume: assembly.volume, unit, shape };
     let lambda = problem.newton()?;
     let (apart, lambda) = (&apart[..], &lambda[..]);
     matrix.update(pool, move |i, j, at, g| g * factor(&psi(&apart[i / BLOCK][at]), &lambda[i], &lambda[j]));
     Ok(())
-}
-
-/// r_b − r_a of every pair, block by block in the order of the matrix. Single precision holds the conditions to 1e-7.
-fn offsets<const D: usize>(rows: &Rows, unit: f64, pool: &Pool) -> Result<Vec<Vec<[f32; D]>>> {
-    let n = rows.cloud.len();
-    let blocks = pool.map_init(n.div_ceil(BLOCK), Scratch::default, |scratch, b| {
-        let (mut block, mut room) = (Vec::new(), Ok(()));
-        rows.visit(b * BLOCK..((b + 1) * BLOCK).min(n), scratch, |row| {
-            if block.try_reserve(row.len()).is_err() {
-                return room = Err(memory::no_memory::<[f32; D]>("pairs", row.len()));
-            }
-            block.extend((0..row.len()).map(|k| std::array::from_fn(|a| (row.d[a][k] / unit) as f32)));
-        })?;
-        room.map(|()| block)
-    });
-    blocks.into_iter().collect()
 }
 
 /// A particle's multipliers, or moments: D first ones, then the second ones by rows of the upper triangle.

@@ -1,6 +1,6 @@
 //! Every operator, a row each. Add an operator here.
 
-use super::projected;
+use super::{Normalise, projected};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 
@@ -10,8 +10,8 @@ pub struct Operator {
     pub about: &'static str,
     /// w ≥ 0 for every pair, whatever kappa: the operator keeps a maximum principle and cannot have growing modes.
     pub positive: bool,
-    /// Whether `normalise=pair` is the default.
-    pub normalise: bool,
+    /// The default of `normalise=`; of projected, what weights are scaled by before they are projected.
+    pub normalise: Normalise,
     /// Symmetric and without growing modes on any particles: implicit integrators may solve with it.
     pub dissipative: bool,
     /// What it makes of a conductivity that is a tensor.
@@ -62,7 +62,7 @@ pub static OPERATORS: &[Operator] = &[
         about: "w = -2 F/r, F = dW/dr (Brookshaw 1985); symmetric, conservative, positive",
         positive: true,
         dissipative: true,
-        normalise: true,
+        normalise: Normalise::Tensor,
         tensor: Tensor::Scalar,
         weight: brookshaw,
     },
@@ -72,7 +72,7 @@ pub static OPERATORS: &[Operator] = &[
                 symmetric, conservative, positive",
         positive: true,
         dissipative: true,
-        normalise: true,
+        normalise: Normalise::Tensor,
         tensor: Tensor::Scalar,
         weight: kernel_itself,
     },
@@ -82,7 +82,7 @@ pub static OPERATORS: &[Operator] = &[
                 positive: has growing modes on disordered particles",
         positive: false,
         dissipative: false,
-        normalise: false,
+        normalise: Normalise::No,
         tensor: Tensor::Scalar,
         weight: |kernel, q, w, spare| {
             kernel.curvature(q, w);
@@ -93,11 +93,12 @@ pub static OPERATORS: &[Operator] = &[
     },
     Operator {
         name: "consistent",
-        about: "weights that are exact for polynomials up to order=2, 4 or 6 on any particles, by local least squares; not \
-                symmetric, so conservative only as far as T is resolved; not positive",
+        about: "weights that are exact for polynomials up to order=2, 4 or 6 on any particles, by local least squares, and \
+                normalised pairs beside free surfaces; not symmetric, so conservative only as far as T is resolved; not \
+                positive",
         positive: false,
         dissipative: false,
-        normalise: false,
+        normalise: Normalise::No,
         tensor: Tensor::Consistent,
         weight: |kernel, q, w, _| kernel.w(q, w),
     },
@@ -107,7 +108,7 @@ pub static OPERATORS: &[Operator] = &[
                 them negative; symmetric, conservative, positive; takes time to make",
         positive: true,
         dissipative: true,
-        normalise: false,
+        normalise: Normalise::Tensor,
         tensor: Tensor::Projected,
         weight: brookshaw,
     },
@@ -117,7 +118,7 @@ pub static OPERATORS: &[Operator] = &[
                 positive only while kappa_par <= 3 kappa_perp",
         positive: false,
         dissipative: false,
-        normalise: true,
+        normalise: Normalise::Tensor,
         tensor: Tensor::Angular(espanol_revenga),
         weight: brookshaw,
     },
@@ -127,7 +128,7 @@ pub static OPERATORS: &[Operator] = &[
                 2019); as espanol-revenga otherwise",
         positive: false,
         dissipative: false,
-        normalise: true,
+        normalise: Normalise::Tensor,
         tensor: Tensor::Angular(espanol_revenga),
         weight: kernel_itself,
     },
@@ -137,7 +138,7 @@ pub static OPERATORS: &[Operator] = &[
                 do not explain; symmetric, conservative, never grows, hardly leaks across b; not monotone",
         positive: false,
         dissipative: true,
-        normalise: true,
+        normalise: Normalise::Pair,
         tensor: Tensor::Twice { limited: false },
         weight: brookshaw,
     },
@@ -147,7 +148,7 @@ pub static OPERATORS: &[Operator] = &[
                 conservative, monotone, hardly leaks across b",
         positive: true,
         dissipative: false,
-        normalise: true,
+        normalise: Normalise::Pair,
         tensor: Tensor::Twice { limited: true },
         weight: brookshaw,
     },
@@ -157,7 +158,7 @@ pub static OPERATORS: &[Operator] = &[
                 then all together; symmetric, conservative, monotone at any anisotropy; takes time to make; leaks across b",
         positive: true,
         dissipative: true,
-        normalise: false,
+        normalise: Normalise::Pair,
         tensor: Tensor::Stencils,
         weight: brookshaw,
     },
@@ -169,9 +170,14 @@ impl Operator {
         !matches!(self.tensor, Tensor::Scalar | Tensor::Consistent | Tensor::Projected)
     }
 
+    /// Whether it turns a tensor into weights of pairs.
+    pub fn turns_weights(&self) -> bool {
+        matches!(self.tensor, Tensor::Angular(_) | Tensor::Stencils)
+    }
+
     /// Whether a weight depends on more than the row that it is in, so that all rows must be made before one is used.
     pub fn joins_rows(&self) -> bool {
-        matches!(self.tensor, Tensor::Stencils | Tensor::Projected)
+        matches!(self.tensor, Tensor::Stencils | Tensor::Projected | Tensor::Consistent)
     }
 
     /// Whether exchanges with particles of fixed T are completed by what lies behind them: weights are exchanges, and

@@ -6,6 +6,9 @@ use nalgebra::Matrix3;
 /// xx, yy, zz, xy, yz, xz: the order in which VTK keeps symmetric tensors. Axes that a space lacks are 0.
 pub type Sym = [f64; 6];
 
+/// The axes of its components.
+pub const AXES: [[usize; 2]; 6] = [[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [0, 2]];
+
 /// The tensor of an isotropic particle.
 pub fn unit(dim: usize) -> Sym {
     std::array::from_fn(|k| f64::from(k < dim))

@@ -9,7 +9,8 @@
 //!
 //! Where layers behind a wall fill the support, nothing changes.
 
-use super::Matrix;
+use super::normalise::{self, Normals};
+use super::{Assembly, Matrix, moments};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::Pool;
@@ -29,21 +30,34 @@ pub struct Walls<'a, F> {
 }
 
 impl<F: Fn(usize) -> bool + Sync + Send> Walls<'_, F> {
-    /// Replaces the second moments K_a beside walls that are cut off by what they would be if the wall went on.
+    /// Replaces what is known of particles beside walls that are cut off by what it would be if the wall went on.
     ///
     /// # Errors
     /// `NoMemory`.
-    pub fn complete_moments(&self, matrix: &Matrix, moments: &mut [f64]) -> Result<()> {
-        let given = memory::copied("second moments", moments)?;
+    pub fn complete_normals(&self, assembly: &Assembly, matrix: &Matrix, normals: &mut Normals) -> Result<()> {
+        let given = memory::copied("second moments", &normals.moments)?;
         let dim = self.rows.cloud.dim();
-        self.rows.map(self.pool, moments, |_: &mut (), row: Row| {
-            let g = matrix.coefficients(row.i);
-            let Some(normal) = self.cut_off(&row, g) else { return Ok(given[row.i]) };
-            let half = 0.5 * self.spacing(row.i);
-            let twice = |k: usize| 1.0 - (along(&row, k, normal) / half).clamp(-1.0, 1.0);
-            let sum: f64 = (0..row.len()).map(|k| g[k] * row.r[k] * row.r[k] * twice(k)).sum();
-            Ok(sum / (2.0 * dim as f64 * self.volume[row.i]))
+        self.rows.map(self.pool, &mut normals.moments, |g: &mut Vec<f64>, row: Row| {
+            let complete = self.went_on(&row, matrix.coefficients(row.i), g)?;
+            let moment = || moments::of_row(g, row.r) / (2.0 * dim as f64 * self.volume[row.i]);
+            Ok(if complete { moment() } else { given[row.i] })
+        })?;
+        let given = memory::copied("second moments", &normals.tensors)?;
+        self.rows.map(self.pool, &mut normals.tensors, |g: &mut Vec<f64>, row: Row| {
+            let complete = self.went_on(&row, matrix.coefficients(row.i), g)?;
+            Ok(if complete { normalise::tensor_of(assembly, &row, g) } else { given[row.i] })
         })
+    }
+
+    /// Fills `out` with the coefficients that a row counts with beside a wall that is cut off; answers whether it is.
+    fn went_on(&self, row: &Row, g: &[f64], out: &mut Vec<f64>) -> Result<bool> {
+        let Some(normal) = self.cut_off(row, g) else { return Ok(false) };
+        let half = 0.5 * self.spacing(row.i);
+        let twice = |k: usize| 1.0 - (along(row, k, normal) / half).clamp(-1.0, 1.0);
+        out.clear();
+        memory::extended("a row of weights", out, g.len(), 0.0)?;
+        out.iter_mut().enumerate().for_each(|(k, out)| *out = g[k] * twice(k));
+        Ok(true)
     }
 
     /// Completes the exchanges of free particles with fixed ones.

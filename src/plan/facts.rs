@@ -2,7 +2,7 @@
 
 use super::Choices;
 use super::preconditioner::Preconditioning;
-use crate::operator::Mean;
+use crate::operator::{Mean, Normalise};
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Facts {
@@ -35,6 +35,8 @@ pub struct Facts {
     pub twice: bool,
     /// A weight depends on more than the row that it is in.
     pub joined: bool,
+    /// How wrong weights that were projected conduct, once they are made.
+    pub defect: Option<f64>,
     /// Weights answer to particles of fixed T.
     pub walls: bool,
     /// Particles beside ones that conduct much better, and those of them that pairs reach over.
@@ -61,7 +63,10 @@ pub struct Facts {
 
 impl Facts {
     pub fn title(&self, choices: &Choices) -> String {
-        let normalised = if choices.normalise { "pair-normalised" } else { "not normalised" };
+        let normalised = match choices.normalise {
+            Normalise::No => "not normalised".to_string(),
+            by => format!("{}-normalised", by.name()),
+        };
         format!(
             "heat: {} particles in {}-D, {:.0} neighbours; {} (h_fac {}), {} {normalised}, {} kappa, {}",
             self.n,

@@ -19,6 +19,7 @@ pub use facts::Facts;
 pub use report::Report;
 pub use state::State;
 
+use crate::operator::Normalise;
 use rules::{RULES, Rule};
 use std::fmt;
 
@@ -96,11 +97,13 @@ impl Plan {
         );
         let [pair, particle] = choices.operator.bytes_to_make(facts.dim);
         if pair > 0.0 {
-            let about = "moments of a Laplacian for all particles at once; memory for as long as it takes";
-            add("project", setup, pairs * pair + n * particle, 30.0 * pairs, about.into());
+            let left = facts.defect.map_or(String::new(), |d| format!("; conduction_defect {d:.1e}"));
+            let about = format!("moments of a Laplacian for all at once; memory for as long as it takes{left}");
+            add("project", setup, pairs * pair + n * particle, 30.0 * pairs, about);
         }
-        if choices.normalise {
-            add("normalise", setup, 8.0 * n, pairs, "pairs scaled by the mean of 1/K_a and 1/K_b".into());
+        let normalise = choices.normalise;
+        if normalise != Normalise::No && pair == 0.0 {
+            add("normalise", setup, n * normalise.bytes(facts.dim), pairs, normalise.about().into());
         }
         if self.leaves_out(&rules::FROZEN) && !self.leaves_out(&rules::UNIFORM_KAPPA) {
             add("fold", setup, 0.0, pairs, format!("{} mean of kappa into the weights", facts.mean.name()));

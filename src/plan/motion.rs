@@ -376,7 +376,7 @@ impl Motion<'_> {
         let start = Instant::now();
         let (growth, fastest) = self.growth(time, t)?;
         self.timers.add("spectrum", start.elapsed());
-        if growth <= GROWS * fastest || self.choices.allow_unstable {
+        if growth <= GROWS * fastest || self.choices.allow.unstable {
             return Ok(());
         }
         let operator = self.choices.operator.name;

@@ -3,7 +3,7 @@
 
 use super::motion::Motion;
 use super::state::{Directions, Geometry, Input, State, Weights};
-use super::{Plan, rules};
+use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
 use crate::integrator::Range;
 use crate::memory;
@@ -14,7 +14,7 @@ use crate::model::tensor::Tensor;
 use crate::operator::table::{self, OPERATORS, Tensor as Form};
 use crate::operator::twice::Recipe;
 use crate::operator::walls::Walls;
-use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, bypass, tensor};
+use crate::operator::{Assembly, Matrix, Multigrid, Normalise, Pairs, Sym, Twice, bypass, tensor};
 use crate::space::{density, rows::Rows};
 use std::borrow::Cow;
 
@@ -23,6 +23,11 @@ const FLAT: f64 = 1e-12;
 
 /// One block in this many is looked at to estimate the number of neighbours.
 const SAMPLE: usize = 16;
+
+/// Fewest particles of which the median K_d2 says anything.
+const SAMPLED: usize = 10;
+/// What it may be: lattices have 0.8 to 1.2, lines in 3-D 0.3; without neighbours it is 0.
+const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 
 impl State {
     /// The plan of the scene as it stands.
@@ -89,7 +94,7 @@ impl State {
                 let rule = format!("it takes no tensor kappa; use {}", able.collect::<Vec<_>>().join(", "));
                 return Err(Error::bad("operator", choices.operator.name, &rule));
             }
-            Form::Angular(_) if !choices.allow_unstable => {
+            Form::Angular(_) if !choices.allow.unstable => {
                 if let Some(i) = tensor.beyond_espanol_revenga(dim) {
                     let value = format!("{:?} times {}", tensor.shape[i], tensor.kappa[i]);
                     let rule = "more anisotropic than kappa_par = 3 kappa_perp, so weights of pairs across b are negative \
@@ -180,7 +185,7 @@ impl State {
     /// Refuses particles that leave an axis of their space empty: sums over neighbours would take a disc for a ball.
     /// Where the axis is periodic and images of the particles are among the neighbours, it is not empty.
     fn refuse_flat(&self, reach: f64) -> Result<()> {
-        let Some(cloud) = self.cloud.as_ref().filter(|c| c.len() > c.dim() && !self.choices.allow_flat) else {
+        let Some(cloud) = self.cloud.as_ref().filter(|c| c.len() > c.dim() && !self.choices.allow.flat) else {
             return Ok(());
         };
         let dim = cloud.dim();
@@ -242,10 +247,9 @@ impl State {
     /// Calls `work` with the assembly of the operator. Needs the geometry.
     pub fn with_assembly<T>(&self, same_h: bool, work: impl FnOnce(&Assembly) -> Result<T>) -> Result<T> {
         let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
-        let (operator, kernel, order) = (self.choices.operator, &self.choices.kernel, self.choices.order);
         let units = self.unit_shape()?;
-        let (shape, any_row) = (shape_of(&self.directions, &units), self.choices.allow_unstable);
-        self.with_rows(|rows| work(&Assembly { operator, kernel, rows, volume, same_h, order, any_row, shape }))
+        let shape = shape_of(&self.directions, &units);
+        self.with_rows(|rows| work(&assembly_of(&self.choices, rows, volume, same_h, shape)))
     }
 
     /// Shapes of isotropic particles, where `without=isotropic` asks for them; else empty.
@@ -290,26 +294,61 @@ impl State {
         }
         self.refuse_what_does_not_fit()?;
         let start = std::time::Instant::now();
-        let (mut matrix, moments) = self.with_assembly(plan.leaves_out(&rules::SAME_H), |a| a.store(&self.pool))?;
-        self.timers.add("weights", start.elapsed());
-        if self.choices.normalise {
-            let start = std::time::Instant::now();
-            let mut completed = memory::copied("second moments", &moments)?;
-            self.at_walls(|walls| walls.complete_moments(&matrix, &mut completed))?;
-            matrix.normalise(&self.pool, &completed)?;
-            self.timers.add("normalise", start.elapsed());
-        }
-        self.at_walls(|walls| walls.complete(&mut matrix))?;
+        let same_h = plan.leaves_out(&rules::SAME_H);
+        let (matrix, moments, defect, made) = self.with_assembly(same_h, |a| {
+            let (mut matrix, mut normals) = a.store(&self.pool)?;
+            let (made, moments) = (std::time::Instant::now(), memory::copied("second moments", &normals.moments)?);
+            if a.normalise != Normalise::No {
+                self.at_walls(|walls| walls.complete_normals(a, &matrix, &mut normals))?;
+                a.normalise(&mut matrix, &normals, &self.pool)?;
+            }
+            self.at_walls(|walls| walls.complete(&mut matrix))?;
+            Ok((matrix, moments, normals.defect, made))
+        })?;
+        self.timers.add("weights", made - start);
+        self.timers.add("normalise", made.elapsed());
         if let (Some(i), Some(cloud)) = (matrix.first_bad(&self.pool), &self.cloud) {
             let what = "a pair weight".to_string();
             return Err(Error::NotFinite { what, index: cloud.host[i] as usize, value: f64::NAN });
         }
+        self.refuse_wrong_volumes(&matrix, &moments)?;
         let twice = match self.choices.operator.tensor {
             Form::Twice { limited } => Some(self.make_twice(plan, limited)?),
             _ => None,
         };
-        self.weights = Some(Weights { matrix, twice, moments, folded: false });
+        self.weights = Some(Weights { matrix, twice, moments, defect, folded: false });
         Ok(())
+    }
+
+    /// Weights as they are before kappa is folded into them.
+    pub fn prepare_unfolded(&mut self, call: &str) -> Result<&Weights> {
+        let plan = self.prepare_fresh(call)?;
+        self.weights = self.weights.take().filter(|w| !w.folded);
+        self.prepare_weights(&plan)?;
+        self.weights.as_ref().ok_or(Error::OutOfOrder { call: call.into(), missing: "set_particles".into() })
+    }
+
+    /// Refuses particles whose volumes have nothing to do with their distances: nothing, or far too much, would flow
+    /// between most of them. Few particles are no sample, and some may be anywhere.
+    fn refuse_wrong_volumes(&self, matrix: &Matrix, moments: &[f64]) -> Result<()> {
+        let n = moments.len();
+        if n < SAMPLED || self.choices.allow.volumes {
+            return Ok(());
+        }
+        let mut sorted = memory::copied("second moments", moments)?;
+        let median = *sorted.select_nth_unstable_by(n / 2, f64::total_cmp).1;
+        if PLAUSIBLE.contains(&median) {
+            return Ok(());
+        }
+        let typical = (0..n).filter(|&i| moments[i] == median).map(|i| (self.host(i), i)).min();
+        let (host, i) = typical.unwrap_or((0, 0));
+        let rule = format!(
+            "half of the particles are at or beyond this one, which has {} neighbours: m/rho should be the volume that a \
+             particle has, and K_d2 is then near 1; check m, rho and their units, give h or a larger h_fac, or insist \
+             with allow=volumes",
+            matrix.neighbours(i)
+        );
+        Err(Error::bad_at("K_d2", host, format!("{median:.3e}"), &rule))
     }
 
     /// Calls `work` where some particles are walls.
@@ -341,7 +380,7 @@ impl State {
     /// The operator `monotone` on these particles, whatever the one that was chosen.
     fn monotone_weights(&self, same_h: bool) -> Result<Matrix> {
         let operator = table::find("monotone")?;
-        let fitted = |a: &Assembly| Assembly { operator, ..*a }.store(&self.pool);
+        let fitted = |a: &Assembly| Assembly { operator, normalise: operator.normalise, ..*a }.store(&self.pool);
         Ok(self.with_assembly(same_h, fitted)?.0)
     }
 
@@ -463,12 +502,8 @@ impl State {
             Some(weights) => Pairs::Stored(&weights.matrix),
             None => {
                 rows = Rows::new(cloud, &g.h, self.choices.kernel.radius(), &self.pool)?;
-                let (operator, kernel, same_h) =
-                    (self.choices.operator, &self.choices.kernel, plan.leaves_out(&rules::SAME_H));
-                let order = self.choices.order;
-                let shape = shape_of(&self.directions, &units);
-                let (volume, any_row) = (&g.volume, self.choices.allow_unstable);
-                assembly = Assembly { operator, kernel, rows: &rows, volume, same_h, order, any_row, shape };
+                let (same_h, shape) = (plan.leaves_out(&rules::SAME_H), shape_of(&self.directions, &units));
+                assembly = assembly_of(&self.choices, &rows, &g.volume, same_h, shape);
                 Pairs::Fresh(&assembly)
             }
         };
@@ -507,6 +542,26 @@ impl State {
         let result = work(&mut motion);
         self.applications += motion.heat.applications;
         result
+    }
+}
+
+fn assembly_of<'a>(
+    choices: &'a Choices,
+    rows: &'a Rows,
+    volume: &'a [f64],
+    same_h: bool,
+    shape: Option<&'a [Sym]>,
+) -> Assembly<'a> {
+    Assembly {
+        operator: choices.operator,
+        normalise: choices.normalise,
+        kernel: &choices.kernel,
+        rows,
+        volume,
+        same_h,
+        order: choices.order,
+        any_row: choices.allow.unstable,
+        shape,
     }
 }
 

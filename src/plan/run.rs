@@ -3,12 +3,13 @@
 use super::choices::Promise;
 use super::input::Energy;
 use super::motion::explicit_limit;
-use super::state::{Input, State};
+use super::state::{Input, Made, State};
 use super::{Plan, Report, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{Bounds, Range};
 use crate::memory;
 use crate::model::fields::{self, Slot};
+use crate::operator::table::Tensor;
 use crate::sum;
 use std::sync::atomic::Ordering;
 use std::time::Instant;
@@ -16,6 +17,8 @@ use std::time::Instant;
 /// How far, relative to the largest |T|, rounding may carry a value over a bound that the method keeps.
 const ROUNDING: f64 = 1e-12;
 
+/// Energy that an operator may make or lose, relative to what is out of balance.
+const MADE: f64 = 0.01;
 /// How far T may leave the bounds of the T that the host gave where the operator promises none, relative to their
 /// distance: a hot disc rings by 5 % under two-first, whatever dt is.
 const RINGING: f64 = 0.1;
@@ -60,9 +63,10 @@ impl State {
         self.check(&plan, &before, &t)?;
         (report.t_min, report.t_max) = self.extrema(&t);
         report.energy = self.energy(&t);
+        let made = self.made_by(&plan, &t, report.energy - report.energy_before)?;
         self.timers.add("check", checked.elapsed());
 
-        self.inputs[fields::T] = Input::Each(t);
+        (self.inputs[fields::T], self.made) = (Input::Each(t), made);
         if self.energy != Energy::Follows {
             self.energy = Energy::Moved;
         }
@@ -197,6 +201,36 @@ impl State {
     /// The host's number of a particle.
     pub fn host(&self, i: usize) -> usize {
         self.cloud.as_ref().map_or(i, |c| c.host[i] as usize)
+    }
+
+    /// What steps have made of energy with this one, by an operator that is not the same from both sides of a pair, where
+    /// nothing else can.
+    fn made_by(&self, plan: &Plan, after: &[f64], energy: f64) -> Result<Made> {
+        if !self.may_grow(plan) || !matches!(self.choices.operator.tensor, Tensor::Consistent) {
+            return Ok(Made::default());
+        }
+        let before = self.each(fields::T)?;
+        let levelled = self.unevenness(&before).max(self.unevenness(after));
+        let made = Made { energy: self.made.energy + energy, levelled: self.made.levelled.max(levelled) };
+        if made.share() > MADE && !self.choices.allow.energy {
+            let rule = format!(
+                "since T was set its weights, which are not the same from both sides of a pair, have made {:.1e} J of the \
+                 {:.1e} J that are out of balance; nothing was changed: use operator=brookshaw or projected, more \
+                 particles beside free surfaces, a smoother T, or insist with allow=energy",
+                made.energy, made.levelled
+            );
+            return Err(Error::bad("operator", self.choices.operator.name, &rule));
+        }
+        Ok(made)
+    }
+
+    /// Σ m c_v |T − mean|
+    fn unevenness(&self, t: &[f64]) -> f64 {
+        let Some(inverse) = &self.inverse_capacity else { return 0.0 };
+        let capacity = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
+        let total = sum::sum(&self.pool, t.len(), capacity);
+        let mean = sum::sum(&self.pool, t.len(), |i| capacity(i) / total * t[i]);
+        sum::sum(&self.pool, t.len(), |i| capacity(i) * (t[i] - mean).abs())
     }
 
     fn refuse_what_is_not_finite(&self, what: &str, values: &[f64]) -> Result<()> {

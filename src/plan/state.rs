@@ -16,7 +16,7 @@ use crate::model::fields::{self, INPUTS, Slot};
 use crate::model::heat::Callback;
 use crate::model::surface::Surface;
 use crate::operator::table::Tensor;
-use crate::operator::{Matrix, Mean, Multigrid, Sym, Twice};
+use crate::operator::{Matrix, Mean, Multigrid, Normalise, Sym, Twice};
 use crate::pool::Pool;
 use crate::space::{Cloud, Domain, facing};
 use crate::sum;
@@ -47,8 +47,24 @@ pub struct Weights {
     pub twice: Option<Twice>,
     /// K_a before normalisation.
     pub moments: Vec<f64>,
+    /// How wrong projected weights still conduct, root mean square.
+    pub defect: Option<f64>,
     /// The averages of kappa are in the coefficients.
     pub folded: bool,
+}
+
+/// What an operator that does not conserve has done.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Made {
+    pub energy: f64,
+    pub levelled: f64,
+}
+
+impl Made {
+    /// Relative to what there was to level out.
+    pub fn share(self) -> f64 {
+        if self.levelled > 0.0 { self.energy.abs() / self.levelled } else { 0.0 }
+    }
 }
 
 /// Called between sub-steps with the time reached and the share of the step done; not 0 cancels.
@@ -93,6 +109,9 @@ pub struct State {
     /// The preconditioner of implicit steps; empty where it is not needed or was not yet.
     pub multigrid: Multigrid,
 
+    /// Energy that steps have made where nothing heats or cools, and the largest Σ m c_v |T − mean|, since T was set.
+    pub made: Made,
+
     /// Steps taken and rates asked for, and whether particles or kappa changed after the first.
     pub steps: u64,
     pub rates: u64,
@@ -132,6 +151,7 @@ impl State {
             span: None,
             parts: None,
             multigrid: Multigrid::default(),
+            made: Made::default(),
             steps: 0,
             rates: 0,
             moves: false,
@@ -195,6 +215,9 @@ impl State {
             (self.inputs[fields::KAPPA], self.lost[fields::KAPPA]) = (Input::Unset, false);
         }
         (self.inputs[slot], self.span) = (input, None);
+        if [fields::T, fields::M, fields::C_V].contains(&slot) {
+            self.made = Made::default();
+        }
         match slot {
             fields::M | fields::RHO | fields::H => self.drop_geometry(),
             fields::KAPPA if self.directions.is_none() => self.drop_kappa(),
@@ -356,7 +379,7 @@ impl State {
         let choices = &self.choices;
         let (heated, exchanging) = (self.heated(), self.exchanging());
         // Espanol & Revenga's weights were checked, unless the host insists.
-        let turned = matches!(choices.operator.tensor, Tensor::Angular(_)) && !choices.allow_unstable;
+        let turned = matches!(choices.operator.tensor, Tensor::Angular(_)) && !choices.allow.unstable;
         let positive = choices.operator.positive || turned;
         Facts {
             n: self.len(),
@@ -373,10 +396,11 @@ impl State {
             exchanging,
             heated,
             rate_only: self.rates > 0 && self.steps == 0,
-            normalised: choices.normalise,
+            normalised: choices.normalise != Normalise::No,
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
             twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
-            may_grow: !positive && !choices.operator.dissipative && !choices.allow_unstable,
+            defect: self.weights.as_ref().and_then(|w| w.defect),
+            may_grow: !positive && !choices.operator.dissipative && !choices.allow.unstable,
             joined: choices.operator.joins_rows(),
             walls: self.has_walls(),
             bypassed: self.bypassed.unwrap_or_default(),

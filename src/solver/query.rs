@@ -9,6 +9,7 @@ use crate::operator::table::Tensor;
 use crate::operator::{consistent, gradient, moments, tensor};
 use crate::plan::state::{Input, State, Weights};
 use crate::space::density;
+use crate::sum;
 
 impl Solver {
     /// A quantity of each particle, in the host's order; the catalogue `fields` lists them.
@@ -85,6 +86,11 @@ impl Solver {
             }
             "K_d2_min" => moments(state, f64::min, f64::INFINITY)?,
             "K_d2_max" => moments(state, f64::max, f64::NEG_INFINITY)?,
+            "conduction_defect" => {
+                let defect = conduction(state)?;
+                sum::rms(&state.pool, defect.len(), |_| 1.0, |i| defect[i])
+            }
+            "energy_defect" => state.made.share(),
             "bypassed" => {
                 state.plan()?;
                 state.bypassed.map_or(0.0, |(_, over)| over as f64)
@@ -118,7 +124,7 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
             let same_h = geometry(state)?.same_h;
             let joined = state.choices.operator.joins_rows();
             if joined {
-                prepared(state)?;
+                state.prepare_unfolded("get")?;
             }
             let stored = state.weights.as_ref().filter(|_| joined).map(|w| &w.matrix);
             let found = state.with_assembly(same_h, |a| moments::first(a, stored, &state.pool))?;
@@ -149,6 +155,7 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
             times_c_v(state, rate)?
         }
         "kappa" => state.kappa_now()?,
+        "conduction_defect" => conduction(state)?,
         "K_d2" => memory::copied("K_d2", &prepared(state)?.moments)?,
         "neighbours" => {
             let matrix = &prepared(state)?.matrix;
@@ -192,6 +199,14 @@ fn geometry(state: &mut State) -> Result<&crate::plan::state::Geometry> {
 fn prepared(state: &mut State) -> Result<&Weights> {
     state.prepare("get")?;
     state.weights.as_ref().ok_or(Error::OutOfOrder { call: "get".into(), missing: "set_particles".into() })
+}
+
+/// How wrong each particle conducts.
+fn conduction(state: &mut State) -> Result<Vec<f64>> {
+    state.prepare_unfolded("get")?;
+    let same_h = geometry(state)?.same_h;
+    let Some(weights) = &state.weights else { return Ok(Vec::new()) };
+    state.with_assembly(same_h, |a| moments::conduction(a, &weights.matrix, &state.pool))
 }
 
 /// The order of each particle's consistent weights; 0 where others are used.

@@ -9,11 +9,13 @@ pub mod density;
 pub mod domain;
 pub mod facing;
 pub mod morton;
+mod nearest;
 pub mod rows;
 mod scratch;
 
 pub use cloud::Cloud;
 pub use domain::Domain;
+pub use nearest::Nearest;
 pub use scratch::{Row, Scratch};
 
 /// At most 3 dimensions; unused axes are empty.

@@ -5,7 +5,7 @@
 //! (x_a − x_b) − shift.
 
 use super::cells::Cells;
-use super::{Axes, Cloud, Row, Scratch};
+use super::{Axes, Cloud, Nearest, Row, Scratch};
 use crate::error::Result;
 use crate::pool::{BLOCK, Pool};
 use std::ops::Range;
@@ -29,6 +29,16 @@ impl<'a> Rows<'a> {
             cloud.domain.check_reach(radius * cells.h_max, cloud.host[largest] as usize)?;
         }
         Ok(Rows { cloud, h, radius, cells })
+    }
+
+    /// The way from a particle to its neighbours without a search; none where one may be a neighbour with two images.
+    pub fn nearest<const D: usize>(&self) -> Option<Nearest<D>> {
+        Nearest::new(&self.cloud.domain, self.radius * self.cells.h_max)
+    }
+
+    /// The largest smoothing length.
+    pub fn largest(&self) -> f64 {
+        self.cells.h_max
     }
 
     /// Whether all smoothing lengths are the same.

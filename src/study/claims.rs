@@ -159,7 +159,7 @@ fn implicit(page: &mut Page, table: &mut Table, request: &Request, _: &[Sample])
     const KERNELS: [&str; 4] = ["M4", "M6", "C2", "C4"];
     // Of two sizes, so that what is said does not hang on one; as many h_fac as tell a rank from chance.
     let lines = request.pick(([16, 24], 0.2), ([60, 120], 0.05), ([200, 400], 0.05));
-    let spaces = request.pick(([2, 3], 0.3), ([4, 8], 0.075), ([12, 24], 0.05));
+    let spaces = request.pick(([2, 3], 0.3), ([4, 6], 0.075), ([12, 24], 0.05));
     let mut said = Vec::new();
     let mut all = Vec::new();
     for (dim, (sizes, step), last) in [(1, lines, 2.0), (3, spaces, 1.4)] {
@@ -212,9 +212,9 @@ fn implicit(page: &mut Page, table: &mut Table, request: &Request, _: &[Sample])
 /// 4: M6 at h_fac 0.9 is twice better than M4 at 1.35 for the same cost.
 fn cost(page: &mut Page, table: &mut Table, request: &Request, _: &[Sample]) -> Result<()> {
     let claim = |what: String| format!("4 {what}: M4 at 1.35, M6 at 0.9");
-    let planes = request.pick([8, 16], [32, 64], [64, 128]);
-    let spaces = request.pick([6, 8], [12, 24], [16, 32]);
-    let seeds = request.pick(1, 5, 5);
+    let planes = request.pick([8, 16], [24, 48], [64, 128]);
+    let spaces = request.pick([6, 8], [8, 16], [16, 32]);
+    let seeds = request.pick(1, 3, 5);
     let clouds = [SQUARE, HEXAGONAL, JITTER_2D, GLASS_2D, CUBIC, FCC, JITTER_3D, GLASS_3D];
     let (mut twice, mut said) = (0, Vec::new());
     for cloud in clouds {
@@ -244,7 +244,7 @@ fn cost(page: &mut Page, table: &mut Table, request: &Request, _: &[Sample]) -> 
     let mut tube = Vec::new();
     let sizes = [
         (1, request.pick([16, 24], [120, 240], [400, 800]), "line"),
-        (3, request.pick([2, 3], [6, 12], [12, 24]), FCC.name),
+        (3, request.pick([2, 3], [4, 8], [12, 24]), FCC.name),
     ];
     for (dim, sizes, cloud) in sizes {
         let mut ratios = Vec::new();

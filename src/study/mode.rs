@@ -3,8 +3,8 @@
 use super::scene::Scene;
 use super::setup::setup;
 use crate::error::Result;
-use crate::operator::Operator;
 use crate::operator::table::{OPERATORS, Tensor};
+use crate::operator::{Normalise, Operator};
 use crate::plan::applies::fitting;
 use crate::words::replaced;
 use std::path::Path;
@@ -118,9 +118,10 @@ pub fn variants() -> Vec<(String, String)> {
         (format!("operator={name} normalise={normalise}"), format!("{name} {normalise}"))
     };
     let pairs = isotropic().flat_map(|o| match (o.normalise, o.tensor) {
-        (true, Tensor::Scalar) => vec![(o.name, "none"), (o.name, "pair")],
-        (true, _) => vec![(o.name, "pair")],
-        (false, _) => vec![(o.name, "none")],
+        (Normalise::No, _) | (_, Tensor::Twice { .. } | Tensor::Projected | Tensor::Stencils) => {
+            vec![(o.name, o.normalise.name())]
+        }
+        _ => vec![(o.name, "none"), (o.name, "pair"), (o.name, "tensor")],
     });
     pairs.map(of).collect()
 }
