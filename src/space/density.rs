@@ -99,7 +99,7 @@ impl Count {
     /// The root of N(h) = target up to `most`, N completed at open faces; none where N(most) is below the target.
     fn solve(&mut self, kernel: &Kernel, weigh: Weigh, row: &Row, (target, most): (f64, f64)) -> Option<f64> {
         let h = self.solve_inside(kernel, weigh, row, target, most)?;
-        if !is_one_sided(row, kernel, h) {
+        if h.is_nan() || !is_one_sided(row, kernel, h) {
             return Some(h);
         }
         let (power, ratio) = (1.0 / kernel.dim() as f64, target.powf(1.0 / kernel.dim() as f64));
@@ -118,7 +118,12 @@ impl Count {
         Some(closer)
     }
 
+    /// NaN where the particles at the very same place are enough by themselves: no length is short enough for them.
     fn solve_inside(&mut self, kernel: &Kernel, weigh: Weigh, row: &Row, target: f64, most: f64) -> Option<f64> {
+        let here = row.j.iter().zip(row.r).filter(|(_, r)| **r == 0.0).map(|(&j, _)| weigh.share(row.i, j));
+        if kernel.w_at(0.0) * (1.0 + here.sum::<f64>()) >= target {
+            return Some(f64::NAN);
+        }
         let (n, _) = self.at(kernel, weigh, row, most);
         if n < target {
             return None;
@@ -284,6 +289,11 @@ fn lengths(kernel: &Kernel, h_fac: f64, cloud: &Cloud, weigh: Weigh, start: Vec<
     for _ in 0..SEARCHES {
         let rows = Rows::new(cloud, &tried, kernel.radius(), pool)?;
         solve_open(kernel, target, &rows, weigh, pool, &mut h)?;
+        if let Some(i) = h.iter().position(|h| h.is_nan()) {
+            let rule =
+                "so many particles are at its place that h and rho have no value; give h or rho, or one particle there";
+            return Err(Error::bad_at("x", cloud.host[i] as usize, "shared", rule));
+        }
         let mut open = 0;
         for (tried, &h) in tried.iter_mut().zip(&h) {
             open += usize::from(h == 0.0);
@@ -449,6 +459,10 @@ mod tests {
         let h = solve(&x).unwrap();
         assert!(h.iter().copied().fold(0.0, f64::max) > 100.0 && h.iter().copied().fold(1.0, f64::min) < 2e-6);
         assert!(solve(&[0.0]).unwrap_err().to_string().contains("h[0]"));
+        // M4 at 0 is 2/3: a second particle at the same place is more than 1.2 asks for.
+        let spaced: Vec<f64> = (0..20).map(f64::from).collect();
+        assert!(solve(&spaced).is_ok());
+        assert!(solve(&[&spaced[..], &[7.0]].concat()).unwrap_err().to_string().contains("x[7] is shared"));
         assert!(solve(&[]).unwrap().is_empty());
     }
 
