@@ -64,7 +64,7 @@ const SCENES: &[Scene] = &[
     ("operator=two-first kernel=M4", tensor),
     ("kernel=M4 integrator=auto", energies),
     ("kernel=C2", by_place),
-    ("kernel=C2 operator=consistent order=2 h_fac=1.9 allow=unstable", by_place),
+    ("kernel=C2 operator=consistent order=2 h_fac=1.9 allow=unstable,energy", by_place),
     ("kernel=M4 integrator=rkl2", by_place),
 ];
 
@@ -74,7 +74,7 @@ fn start((words, given): &Scene, x: &[f64]) -> Solver {
     s.set_box(&[0.0; 2], &[1.0; 2], &[true, false]).unwrap();
     s.set_particles(Strided::new("x", x, n, 2, 2).unwrap()).unwrap();
     s.set_number("m", 1.0 / n as f64).unwrap();
-    set(&mut s, "T", &field(x, 2, |p| 2.0 + (6.28 * p[0]).sin() * p[1]));
+    set(&mut s, "T", &field(x, 2, |p| 2.0 + (std::f64::consts::TAU * p[0]).sin() * p[1]));
     given(&mut s, x);
     s
 }

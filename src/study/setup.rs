@@ -120,7 +120,7 @@ impl Setup<'_> {
     }
 
     /// Particles from a file. Of a snapshot's box, that of the scene takes the place.
-    fn from_file(&mut self, path: &Path) -> Result<()> {
+    fn read_file(&mut self, path: &Path) -> Result<()> {
         let snapshot = io::read(path)?;
         if snapshot.points.is_empty() {
             let reason = "it holds no particles".into();
@@ -174,7 +174,7 @@ impl Setup<'_> {
         let dim = self.solver.dim();
         let Particles { file, lattice: name, n, jitter, seed, glass, made } = &self.scene.particles;
         if let Some(file) = file {
-            self.from_file(&folder.join(file))?;
+            self.read_file(&folder.join(file))?;
         } else if let (Some(name), Some(n), Some(space)) = (name, n, &self.scene.space) {
             let volume: f64 = space.lo.iter().zip(&space.hi).map(|(lo, hi)| hi - lo).product();
             let cell = |x: &[f64]| volume * dim as f64 / x.len() as f64;

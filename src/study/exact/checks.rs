@@ -11,6 +11,9 @@ use std::collections::BTreeMap;
 /// kappa(T), rho c_v and the source at a place.
 type Material = (fn(f64) -> f64, f64, f64);
 
+/// What is and what must be, and how near, absolutely.
+type Condition = (f64, f64, f64);
+
 struct Check {
     name: &'static str,
     dims: &'static [usize],
@@ -19,8 +22,8 @@ struct Check {
     /// Places and times where the equation is tried.
     places: &'static [[f64; 3]],
     times: &'static [f64],
-    /// Pairs of what is and what must be, and how near, absolutely; for an exact solution in so many dimensions.
-    conditions: fn(&Exact, usize) -> Vec<(f64, f64, f64)>,
+    /// Of an exact solution in so many dimensions.
+    conditions: fn(&Exact, usize) -> Vec<Condition>,
     /// In the first of `dims`: place, time, T, how near.
     known: &'static [([f64; 3], f64, f64, f64)],
     steady: bool,
@@ -310,7 +313,8 @@ fn solutions_that_are_wrong_are_noticed() {
     for check in CHECKS {
         let dim = check.dims[0];
         // erf(x/sqrt(5 D t)) in place of erf(x/sqrt(4 D t)), a place and a size that are off by some per cent or less.
-        let wrong: [(&str, fn(Exact) -> Exact); 3] = [
+        type Spoil = fn(Exact) -> Exact;
+        let wrong: [(&str, Spoil); 3] = [
             ("time", |f| Box::new(move |x, t| f(x, 1.25 * t))),
             ("place", |f| Box::new(move |x, t| f([1.02 * x[0] + 0.01, x[1], x[2]], t))),
             ("size", |f| Box::new(move |x, t| 1.001 * f(x, t))),

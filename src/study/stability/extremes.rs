@@ -144,7 +144,7 @@ fn odd_h(setting: &Setting, seen: &mut Seen) -> Result<()> {
 /// Rates in boxes of few particles and in the same boxes repeated.
 fn small_box(setting: &Setting, seen: &mut Seen) -> Result<()> {
     for (wide, high) in [(3, 3), (6, 2), (7, 1), (2, 2)] {
-        let copies = [15 / wide | 1, if high == 1 { 9 } else { 5 }];
+        let copies = [(15 / wide) | 1, if high == 1 { 9 } else { 5 }];
         let (small, large) =
             (rates_of_copies(setting, [wide, high], [1, 1])?, rates_of_copies(setting, [wide, high], copies)?);
         seen.remember(&small);
