@@ -122,7 +122,7 @@ mod tests {
             ("operator=monotone gradient=plain", "gradient", "two-first"),
             ("allow=unstable", "allow", "direct"),
             ("dim=1 allow=flat", "allow", "dim=2 or 3"),
-            ("operator=consistent normalise=pair", "normalise", "moments of a Laplacian"),
+            ("operator=consistent normalise=pair", "normalise", "exact already"),
             ("integrator=euler stages=5", "stages", "rkl1"),
             ("integrator=sdirk2 max_stages=5", "max_stages", "rkl1"),
             ("integrator=rkl2 stages=5 max_stages=9", "max_stages", "pinned"),

@@ -30,7 +30,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "allow",
-        "what is refused otherwise, separated by commas: unstable, to run espanol-revenga beyond kappa_par = 3 kappa_perp, where modes may grow, and consistent and direct whatever their spectra, consistent beside free surfaces too; energy, steps of consistent that make or lose more than 1 % of what they level out; volumes, particles whose m/rho is not the volume that they have (K_d2 far from 1); flat, particles that fill fewer dimensions than dim, like a sheet of one layer in 3-D",
+        "what is refused otherwise, by commas: unstable, modes that may grow; energy, consistent weights that make or lose more than 1 %; volumes, m/rho far from what distances say (K_d2); flat, particles that fill fewer dimensions than dim",
     ),
     (
         "normalise",
@@ -55,12 +55,12 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "bounds",
-        "keep: T stays between its own extremes and those of the surroundings, by sub-steps that are cut where they leave them; free: stability only (default keep where the operator is positive; with direct, consistent and two-first, which cannot, a step that leaves them by more than 10 % is refused)",
+        "keep: T stays between its own extremes and those of the surroundings; free: only stability counts (default keep where the operator is positive; with the others a step that leaves them by more than 10 % is refused)",
     ),
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     (
         "tolerance",
-        "most error in time of a sub-step, root mean square, relative to the spread of T; off: dt, stability or change= decides (default off; of auto, rkl1 and rkl2 1e-3). Errors of sub-steps add up: after a decay methods of order 2 and more err by 0.1 to 3 times this much, euler, rkl1 and backward-euler by up to 300 times",
+        "most rms error of a sub-step over the spread of T; off: dt, stability or change= decide (default off; auto, rkl1, rkl2 1e-3). They add up: over a decay to 0.1 to 3 times this, by euler, rkl1, backward-euler to 300 times",
     ),
     (
         "solver_tolerance",
@@ -175,15 +175,10 @@ impl Choices {
         let positive = |v: f64| v > 0.0 && v.is_finite();
         let h_fac = words.number("h_fac", "h_fac must be positive", positive)?.unwrap_or(kernel.h_fac());
         let operator = table::find(words.take("operator").unwrap_or("brookshaw"))?;
-        let consistent = matches!(operator.tensor, Tensor::Consistent);
         let normalise = match words.take("normalise") {
             None => operator.normalise,
             Some(word) => choice("normalise", word, NORMALISATIONS)?,
         };
-        if consistent && normalise != Normalise::No {
-            let rule = "weights of operator=consistent have the moments of a Laplacian by themselves; leave it out";
-            return Err(Error::bad("normalise", normalise.name(), rule));
-        }
         let mean = words.take("mean").map(Mean::find).transpose()?;
         if mean == Some(Mean::Geometric) && matches!(operator.tensor, Tensor::Twice { .. }) {
             let rule =
