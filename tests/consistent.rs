@@ -245,3 +245,31 @@ fn a_mode_that_grows_is_refused_before_any_step() {
     println!("growth {relative:e}: {error}");
     assert!(relative > 1e-3);
 }
+
+#[test]
+fn what_comes_in_at_a_face_or_from_a_source_is_accounted_for_or_refused() {
+    let n = 40;
+    let x = lattice(n, 1, 0.0);
+    let end = |value: f64| move |p: &[f64]| if p[0] < 1.0 / n as f64 { value } else { 0.0 };
+    let open = |words: &str, name: &str, value: f64| {
+        let mut s = unit_box(&format!("operator=consistent {words}"), &x, 1, false);
+        s.set_number("T", 1.0).unwrap();
+        set(&mut s, name, &field(&x, 1, end(value)));
+        let done = s.step(0.5).map(drop);
+        (done, s.get_all("T").unwrap().iter().sum::<f64>() / n as f64 - 1.0)
+    };
+    for (name, value) in [("flux_in", 1.0), ("h_conv", 1.0), ("source", n as f64)] {
+        let (done, rise) = open("", name, value);
+        let error = done.unwrap_err().to_string();
+        assert!(error.contains("consistent") && error.contains("allow=energy") && rise == 0.0, "{name}: {error}");
+    }
+    // Three quarters of what came in: that is what is refused.
+    let (done, rise) = open("allow=energy", "flux_in", 1.0);
+    assert!(done.is_ok() && (0.3..0.4).contains(&rise), "{rise}");
+    // A source of next to nothing does not switch the account off.
+    let x = lattice(14, 2, 0.2);
+    let mut s = unit_box("operator=consistent", &x, 2, false);
+    set(&mut s, "T", &field(&x, 2, |p| f64::from(p[0] < 0.25 && p[1] < 0.25)));
+    s.set_number("source", 1e-30).unwrap();
+    assert!(s.step(0.05).unwrap_err().to_string().contains("allow=energy"));
+}

@@ -276,3 +276,16 @@ fn a_thin_periodic_box_is_the_box_repeated() {
         assert!(error < if fitted { 1e-6 } else { 1e-11 }, "{words}: {error:e}");
     }
 }
+
+#[test]
+fn operators_that_are_wrong_in_one_layer_are_refused_there() {
+    for operator in ["two-first", "limited", "monotone"] {
+        for (jitter, words) in [(0.0, "allow=flat"), (0.1, "allow=flat"), (0.1, "")] {
+            let (mut s, _) = grid(&format!("operator={operator} {words}"), &[40, 1], &[1.0; 2], jitter, &[true, false]);
+            let error = s.get_all("dT_dt").unwrap_err().to_string();
+            assert!(error.contains("conduct wrong with it") && error.contains("along y"), "{operator}: {error}");
+        }
+        let (mut s, _) = grid(&format!("operator={operator}"), &[40, 6], &[1.0; 2], 0.1, &[true, false]);
+        s.get_all("dT_dt").unwrap();
+    }
+}

@@ -32,6 +32,9 @@ const RECOVERY: f64 = 1.5;
 /// counts as none.
 const CONFINED: f64 = 1e-4;
 
+/// Of a step, the shortest first sub-step that is guessed: a spread of next to nothing says little of how long is too long.
+const SHORTEST: f64 = 1e-9;
+
 /// Differences of so many roundings of y are no error of the method.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
@@ -85,10 +88,13 @@ impl<'a> Adaptive<'a> {
         let array = || memory::filled("error control", y.len(), 0.0);
         let (mut rate, start) = (array()?, memory::copied("error control", y)?);
         system.rate(t, y, &mut rate)?;
-        let spread = sum::spread(pool, y.len(), |i| weight[i], |i| y[i]);
+        // What rounding makes of equal values is no spread.
+        let size = sum::max(pool, y.len(), |i| y[i].abs());
+        let spread =
+            Some(sum::spread(pool, y.len(), |i| weight[i], |i| y[i])).filter(|s| *s > ROUNDING * size).unwrap_or(0.0);
         let speed = sum::rms(pool, y.len(), |i| weight[i], |i| rate[i]);
         let guess = control.tolerance.map_or(dt, |tolerance| tolerance.powf(control.exponent()) * (spread / speed));
-        let length = if guess > 0.0 { guess.min(dt) } else { dt };
+        let length = if guess > 0.0 { guess.max(SHORTEST * dt).min(dt) } else { dt };
         let (trial, other) = (array()?, array()?);
         let (failure, last, rejected, slack) = (None, None, 0, 0.0);
         Ok(Adaptive {

@@ -221,14 +221,17 @@ impl Motion<'_> {
     /// after a steep beginning are longer.
     fn refuse_what_does_not_end(&self, pace: &Adaptive, (dt, rest): (f64, f64), applications: u64) -> Result<()> {
         let (allowed, part) = (self.choices.options.max_applications, pace.next(rest, f64::INFINITY));
-        if rest == 0.0 || (applications <= allowed && part >= f64::EPSILON * rest) {
+        // An implicit sub-step takes as many as it takes; what came of one that took too many is not had.
+        let over = applications > allowed && (rest > 0.0 || self.choices.method.is_implicit());
+        if !over && (rest == 0.0 || part >= f64::EPSILON * rest) {
             return Ok(());
         }
         Err(match pace.failure() {
             Some(failure) => self.of_host(failure.clone()),
             None => {
                 // As many again for what is left, or one for each sub-step where nothing is done yet.
-                let needed = (applications as f64 * dt / (dt - rest)).min(applications as f64 + rest / part);
+                let ahead = if rest > 0.0 { rest / part } else { 0.0 };
+                let needed = (applications as f64 * dt / (dt - rest)).min(applications as f64 + ahead);
                 Error::StepTooLarge { dt, needed, allowed, remedy: self.remedy().into() }
             }
         })

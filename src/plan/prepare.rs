@@ -185,25 +185,42 @@ impl State {
     /// Refuses particles that leave an axis of their space empty: sums over neighbours would take a disc for a ball.
     /// Where the axis is periodic and images of the particles are among the neighbours, it is not empty.
     fn refuse_flat(&self, reach: f64) -> Result<()> {
-        let Some(cloud) = self.cloud.as_ref().filter(|c| c.len() > c.dim() && !self.choices.allow.flat) else {
+        let thick = self.needs_thickness();
+        let Some(cloud) = self.cloud.as_ref().filter(|c| c.len() > c.dim() && (thick || !self.choices.allow.flat))
+        else {
             return Ok(());
         };
         let dim = cloud.dim();
         let extents: Vec<f64> = (0..dim).map(|axis| self.extent(axis)).collect();
         let widest = extents.iter().copied().fold(0.0, f64::max);
         let imaged = |axis: usize| cloud.domain.periodic[axis] && reach >= cloud.domain.length(axis);
-        let empty: Vec<usize> = (0..dim).filter(|&a| extents[a] <= FLAT * widest && !imaged(a)).collect();
+        let spacing = reach / (self.choices.kernel.radius() * self.choices.h_fac);
+        let least = if thick { 0.5 * spacing } else { 0.0 };
+        let empty: Vec<usize> = (0..dim).filter(|&a| extents[a] <= least.max(FLAT * widest) && !imaged(a)).collect();
         if empty.is_empty() || widest == 0.0 {
             return Ok(());
         }
         let axes: Vec<&str> = empty.iter().map(|&a| ["x", "y", "z"][a]).collect();
         let (axes, rest) = (axes.join(" and "), dim - empty.len());
+        if thick {
+            let rule = format!(
+                "particles less than half a spacing thick along {axes} conduct wrong with it: use operator=brookshaw, kernel or \
+                 projected, or fewer dimensions"
+            );
+            return Err(Error::bad("operator", self.choices.operator.name, &rule));
+        }
         let value = format!("flat along {axes}: all {} particles have the same", cloud.len());
         let rule = format!(
             "particles that fill {rest} of {dim} dimensions need dim={rest} and their other coordinates alone; a sheet or a \
              row of one layer in {dim}-D space is had by insisting with allow=flat"
         );
         Err(Error::bad("x", value, &rule))
+    }
+
+    /// Whether the operator is wrong in sheets and strings of one layer: two gradients see noise across them, and weights
+    /// that are scaled in the mean over directions conduct too well along them.
+    fn needs_thickness(&self) -> bool {
+        matches!(self.choices.operator.tensor, Form::Twice { .. } | Form::Stencils)
     }
 
     /// h as given, or h_fac (m/rho)^(1/nu).
@@ -295,7 +312,7 @@ impl State {
         self.refuse_what_does_not_fit()?;
         let start = std::time::Instant::now();
         let same_h = plan.leaves_out(&rules::SAME_H);
-        let (matrix, moments, defect, made) = self.with_assembly(same_h, |a| {
+        let (matrix, moments, (defect, paired), made) = self.with_assembly(same_h, |a| {
             let (mut matrix, mut normals) = a.store(&self.pool)?;
             let (made, moments) = (std::time::Instant::now(), memory::copied("second moments", &normals.moments)?);
             if a.normalise != Normalise::No {
@@ -303,7 +320,7 @@ impl State {
                 a.normalise(&mut matrix, &normals, &self.pool)?;
             }
             self.at_walls(|walls| walls.complete(&mut matrix))?;
-            Ok((matrix, moments, normals.defect, made))
+            Ok((matrix, moments, (normals.defect, normals.paired.contains(&true)), made))
         })?;
         self.timers.add("weights", made - start);
         self.timers.add("normalise", made.elapsed());
@@ -316,7 +333,7 @@ impl State {
             Form::Twice { limited } => Some(self.make_twice(plan, limited)?),
             _ => None,
         };
-        self.weights = Some(Weights { matrix, twice, moments, defect, folded: false });
+        self.weights = Some(Weights { matrix, twice, moments, defect, paired, folded: false });
         Ok(())
     }
 

@@ -49,6 +49,8 @@ pub struct Weights {
     pub moments: Vec<f64>,
     /// How wrong projected weights still conduct, root mean square.
     pub defect: Option<f64>,
+    /// Some rows of consistent weights are normalised pairs, beside free surfaces.
+    pub paired: bool,
     /// The averages of kappa are in the coefficients.
     pub folded: bool,
 }
