@@ -343,3 +343,33 @@ fn names_that_no_tool_would_open_are_refused() {
     let legacy = std::fs::read(dir.path().join("E.VTK")).unwrap();
     assert!(legacy.starts_with(b"# vtk DataFile") && Path::new("E.VTK").extension().is_some());
 }
+
+#[test]
+fn particles_that_move_first_start_from_the_lengths_that_were_found() {
+    let x = lattice(10, 2, 0.15);
+    let dir = tempfile::tempdir().unwrap();
+    let file = dir.path().join("a.vtu");
+    let mut whole = start(&("kernel=M4", numbers), &x);
+    whole.step(1e-4).unwrap();
+    whole.write_vtk(&file).unwrap();
+    let mut again = Solver::new(whole.words()).unwrap();
+    again.read_vtk(&file).unwrap();
+    for s in [&mut whole, &mut again] {
+        place(s, &moved(&x, 1e-2));
+        s.step(1e-3).unwrap();
+    }
+    assert_eq!(all(&mut again), all(&mut whole));
+}
+
+#[test]
+fn a_step_that_fails_leaves_the_plan_as_it_was_and_a_file_without_particles_changes_nothing() {
+    let x = lattice(10, 2, 0.15);
+    let mut s = start(&("kernel=M4", numbers), &x);
+    s.step(1e-4).unwrap();
+    let plan = s.plan().unwrap().to_string();
+    s.step(1e300).unwrap_err();
+    assert_eq!(s.plan().unwrap().to_string(), plan);
+    let empty = diffusph::io::Snapshot::default();
+    assert!(s.set_snapshot(&empty).unwrap_err().to_string().contains("no particles"));
+    assert_eq!(s.len(), x.len() / 2);
+}

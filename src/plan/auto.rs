@@ -25,6 +25,7 @@ const FREE: f64 = 500.0;
 /// Unless told otherwise: without a tolerance the methods differ in more than work. rkl2 alone errs by some 5e-4.
 pub const TOLERANCE: f64 = 1e-3;
 
+#[derive(Clone)]
 pub struct Auto {
     /// What was chosen for the last step, and why.
     pub reason: String,

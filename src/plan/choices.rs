@@ -291,7 +291,11 @@ fn options(words: &mut Words, operator: &Operator, unstable: bool) -> Result<(Op
 /// A method, and whether it is the first of several.
 fn method(word: &str) -> Result<(&'static Method, Option<Auto>)> {
     if word != "auto" {
-        return Ok((integrator::find(word)?, None));
+        let known = || integrator::METHODS.iter().map(|m| m.name).chain(["auto"]);
+        return match integrator::find(word) {
+            Ok(method) => Ok((method, None)),
+            Err(_) => Err(Error::unknown("integrator", word, known())),
+        };
     }
     let auto = Auto::default();
     Ok((auto.first()?, Some(auto)))

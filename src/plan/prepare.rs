@@ -185,7 +185,7 @@ impl State {
     /// Refuses particles that leave an axis of their space empty: sums over neighbours would take a disc for a ball.
     /// Where the axis is periodic and images of the particles are among the neighbours, it is not empty.
     fn refuse_flat(&self, reach: f64) -> Result<()> {
-        let thick = self.needs_thickness();
+        let thick = self.needs_thickness() && reach.is_finite();
         let Some(cloud) = self.cloud.as_ref().filter(|c| c.len() > c.dim() && (thick || !self.choices.allow.flat))
         else {
             return Ok(());

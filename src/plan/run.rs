@@ -38,6 +38,16 @@ impl State {
     /// `BadValue` for a dt that is negative or not finite; any error of [`State::prepare`]; `StepTooLarge`,
     /// `NotFinite`, `OutOfBounds`, `Growth`, `Cancelled`, `CallbackFailed`. The state is as it was in every case.
     pub fn step(&mut self, dt: f64) -> Result<Report> {
+        let (method, auto) = (self.choices.method, self.choices.auto.clone());
+        let done = self.take_step(dt);
+        if done.is_err() {
+            // What was chosen for a step that was not taken.
+            (self.choices.method, self.choices.auto) = (method, auto);
+        }
+        done
+    }
+
+    fn take_step(&mut self, dt: f64) -> Result<Report> {
         if !(dt >= 0.0 && dt.is_finite()) {
             return Err(Error::bad("dt", dt, "a step must be finite and not negative"));
         }
@@ -59,7 +69,7 @@ impl State {
             motion.range = range;
             motion.advance(time, dt, &mut t, &mut report)
         })
-        .map_err(|error| of_whole_step(error, dt))?;
+        .map_err(|error| self.of_whole_step(error, dt))?;
         let checked = Instant::now();
         self.check(&plan, &before, &t)?;
         (report.t_min, report.t_max) = self.extrema(&t);
@@ -275,6 +285,18 @@ impl State {
         self.check_bounds(before.range, slack, t)
     }
 
+    /// An error that names the step that the host asked for, whatever part of it failed, and advice that can be followed.
+    fn of_whole_step(&self, error: Error, dt: f64) -> Error {
+        let again = "ask for less by a larger tolerance".to_string();
+        match error {
+            Error::StepTooLarge { needed, allowed, remedy, .. } => {
+                let remedy = if self.choices.auto.is_some() { again } else { remedy };
+                Error::StepTooLarge { dt, needed, allowed, remedy }
+            }
+            other => other,
+        }
+    }
+
     /// Whether T is where the maximum principle has it: exactly where that is promised, nearly where the operator promises
     /// no such thing.
     fn check_bounds(&self, range: Range, slack: f64, t: &[f64]) -> Result<()> {
@@ -290,13 +312,5 @@ impl State {
             _ => format!("diffusion keeps and operator={} misses", self.choices.operator.name),
         };
         Err(Error::OutOfBounds { index: self.host(i), value: t[i], low: range.low, high: range.high, promise })
-    }
-}
-
-/// An error that names the step that the host asked for, whatever part of it failed.
-fn of_whole_step(error: Error, dt: f64) -> Error {
-    match error {
-        Error::StepTooLarge { needed, allowed, remedy, .. } => Error::StepTooLarge { dt, needed, allowed, remedy },
-        other => other,
     }
 }

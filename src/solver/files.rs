@@ -126,6 +126,9 @@ impl Solver {
     /// As [`Solver::read_vtk`].
     pub fn set_snapshot(&mut self, snapshot: &Snapshot) -> Result<()> {
         let (n, dim) = (snapshot.points.len(), self.dim());
+        if n == 0 {
+            return Err(Error::bad("points", 0, "it holds no particles; nothing was changed"));
+        }
         let notes = Notes::read(snapshot, dim)?;
         let frame = Frame::of(&snapshot.points, dim, restart::axes(snapshot))?;
         let mut x = memory::reserved("x", n * dim)?;
@@ -149,7 +152,11 @@ impl Solver {
         }
         let Some(notes) = notes else {
             let domain = self.state.domain.clone();
-            self.state.accept(&Offer { domain, x, given: &given, energy: None, anew: false })?;
+            let has_t = found.iter().any(|(slot, _)| *slot == fields::T);
+            let u = snapshot.field("u").filter(|_| !has_t).map(doubles).transpose()?;
+            u.iter().try_for_each(|u| check(fields::T, "u", &Strided::packed(u), n))?;
+            let energy = u.as_ref().map(|u| Offered::Each(Strided::packed(u)));
+            self.state.accept(&Offer { domain, x, given: &given, energy, anew: false })?;
             self.state.time = snapshot.time.unwrap_or(self.state.time);
             self.frame = frame;
             return Ok(());
@@ -160,6 +167,9 @@ impl Solver {
             values.map(|values| check(like, name, &Strided::packed(&values), n).map(|()| values)).transpose()
         };
         let last_h = array(restart::H_START, fields::H)?.unwrap_or_default();
+        // Where particles move before anything is asked for, the search for h starts from those that were found.
+        let finds = [fields::RHO, fields::H].iter().all(|slot| given.iter().all(|(other, _)| other != slot));
+        let found_h = if finds { array("h", fields::H)?.unwrap_or_default() } else { Vec::new() };
         let u = match notes.energy {
             Some(None) => array("u", fields::T)?.ok_or_else(|| lacks("u")).map(Some)?,
             _ => None,
@@ -171,7 +181,7 @@ impl Solver {
             _ => None,
         };
         self.state.accept(&Offer { domain: notes.domain.clone(), x, given: &given, energy, anew: true })?;
-        self.resume(notes, last_h);
+        self.resume(notes, (last_h, found_h));
         self.state.time = snapshot.time.unwrap_or(self.state.time);
         self.frame = frame;
         Ok(())

@@ -99,7 +99,7 @@ impl Solver {
     }
 
     /// Takes over what is not a quantity of the particles; these are in place.
-    pub(super) fn resume(&mut self, notes: Notes, last_h: Vec<f64>) {
+    pub(super) fn resume(&mut self, notes: Notes, (last_h, found_h): (Vec<f64>, Vec<f64>)) {
         let state = &mut self.state;
         state.set_sigma_sb(notes.sigma_sb);
         if !notes.kappa_callback {
@@ -109,8 +109,7 @@ impl Solver {
             state.source_host = None;
         }
         state.forget_geometry();
-        state.found_h = Vec::new();
-        state.last_h = last_h;
+        (state.last_h, state.found_h) = (last_h, found_h);
         let History { steps, rates, moves, kappa_changes, was_done_here, span } = notes.history;
         (state.steps, state.rates, state.moves, state.kappa_changes) = (steps, rates, moves, kappa_changes);
         (state.was_done_here, state.span) = (was_done_here, span);
