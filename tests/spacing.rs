@@ -186,7 +186,8 @@ fn open_clouds_conduct_beside_their_surfaces() {
 
 #[test]
 fn disorder_is_no_worse_than_with_pairs_and_conserves() {
-    let clouds: [(&str, usize, &dyn Fn(u64) -> Vec<f64>); 5] = [
+    type Made<'a> = &'a dyn Fn(u64) -> Vec<f64>;
+    let clouds: [(&str, usize, Made); 5] = [
         ("2-D, 20 %", 2, &|seed| shaken(24, 2, 0.2, seed)),
         ("2-D, 40 %", 2, &|seed| shaken(24, 2, 0.4, seed)),
         ("2-D, random", 2, &|seed| shaken(24, 2, 24.0, seed)),
