@@ -49,7 +49,7 @@ fn fixed_temperatures_and_a_source_give_a_parabola() {
         s.set_number("source", source).unwrap();
         // Held particles have the exact values; inside, the start is far from them.
         set(&mut s, "T", &x.iter().zip(&fixed).map(|(&x, &f)| f * exact(x)).collect::<Vec<_>>());
-        (0..8).for_each(|_| drop(s.step(20.0).unwrap()));
+        (0..8).for_each(|_| _ = s.step(20.0).unwrap());
         // On a lattice the normalised operator is exact for parabolas; (1 + pi² 20)^-8 of the start is left.
         let t = s.get_all("T").unwrap();
         let worst = x.iter().zip(&t).map(|(&x, t)| (t - exact(x)).abs()).fold(0.0, f64::max);
@@ -384,7 +384,7 @@ fn flux_errors(words: &str, ratio: f64, jitter: f64, tensor: bool) -> (f64, f64)
     }
     set(&mut s, "fixed", &field(&x, 2, |p| f64::from(!(0.0..=1.0).contains(&p[0]))));
     set(&mut s, "T", &field(&x, 2, |p| layers.at(p[0])));
-    (0..4).for_each(|_| drop(s.step(1.0).unwrap()));
+    (0..4).for_each(|_| _ = s.step(1.0).unwrap());
     let (flux, gradient) = (s.get_all("flux").unwrap(), s.get_all("grad_T").unwrap());
     let q = 1.0 / (0.5 + 0.5 / ratio);
     let (mut sums, mut count) = ([0.0; 2], 0.0);
