@@ -138,7 +138,7 @@ fn free(x: &[f64], words: &str) -> Solver {
     s.set_box(&[0.0; 2], &[1.0; 2], &[true; 2]).unwrap();
     place(&mut s, x).unwrap();
     [("m", 2.0 / x.len() as f64), ("kappa", 1.0)].iter().for_each(|(name, v)| s.set_number(name, *v).unwrap());
-    set(&mut s, "T", &field(x, 2, |p| 1.0 + (6.28 * p[0]).sin()));
+    set(&mut s, "T", &field(x, 2, |p| 1.0 + (std::f64::consts::TAU * p[0]).sin()));
     s
 }
 
@@ -147,7 +147,8 @@ fn a_call_that_fails_or_only_looks_leaves_no_trace_in_later_results() {
     let x = lattice(20, 2, 0.3);
     let elsewhere: Vec<f64> = x.iter().map(|x| x + 4e-3 * (40.0 * x).cos()).collect();
     let nothing: fn(&mut Solver) = |_| ();
-    let between: [(&str, fn(&mut Solver)); 10] = [
+    type Call = fn(&mut Solver);
+    let between: [(&str, Call); 10] = [
         ("nothing", nothing),
         ("a step that is no step", |s| drop(s.step(-1.0).unwrap_err())),
         ("a step that is cancelled", |s| {
@@ -226,7 +227,7 @@ fn crowd(alike: bool) -> Crowd {
     }
     let own = |i: usize| if alike { 0.0 } else { ((7 * i) % 5) as f64 };
     let by = |f: &dyn Fn(usize) -> f64| (0..144).map(f).collect::<Vec<f64>>();
-    let t = field(&x, 2, |p| 2.0 + (6.28 * p[0]).sin() * p[1]);
+    let t = field(&x, 2, |p| 2.0 + (std::f64::consts::TAU * p[0]).sin() * p[1]);
     let data = vec![
         ("m", by(&|i| (1.0 + 0.1 * own(i)) / 144.0)),
         ("T", by(&|i| t[i] + 0.2 * own(i))),
