@@ -399,7 +399,8 @@ fn implicit_steps_keep_what_they_may_cost() {
         let start = starts(&x)[0].1.clone();
         set(&mut s, "T", &start);
         let error = s.step(1.0).unwrap_err();
-        assert_eq!(error.name(), "STEP_TOO_LARGE", "{method}: {error}");
+        // Or what was amiss with the sub-steps that it did try.
+        assert!(["STEP_TOO_LARGE", "OUT_OF_BOUNDS"].contains(&error.name()), "{method}: {error}");
         assert_eq!(bits(&s.get_all("T").unwrap()), bits(&start));
     }
 }

@@ -132,7 +132,7 @@ impl Assembly<'_> {
             }
             Tensor::Consistent if normals.paired.contains(&true) => {
                 self.pair_up(&mut matrix, &normals.paired, pool)?;
-                normals = moments::normals(self, &matrix, pool)?;
+                normals = Normals { paired: normals.paired, ..moments::normals(self, &matrix, pool)? };
             }
             _ => {}
         }
