@@ -366,9 +366,15 @@ fn a_step_that_fails_leaves_the_plan_as_it_was_and_a_file_without_particles_chan
     let x = lattice(10, 2, 0.15);
     let mut s = start(&("kernel=M4", numbers), &x);
     s.step(1e-4).unwrap();
-    let plan = s.plan().unwrap().to_string();
+    // What the failed step asked memory for may still be held.
+    let plan = |s: &mut Solver| {
+        let plan = s.plan().unwrap();
+        let passes: Vec<_> = plan.passes.iter().map(|p| (p.name, p.about.clone(), p.when)).collect();
+        (plan.title.clone(), passes, plan.left_out.clone())
+    };
+    let before = plan(&mut s);
     s.step(1e300).unwrap_err();
-    assert_eq!(s.plan().unwrap().to_string(), plan);
+    assert!(plan(&mut s) == before);
     let empty = diffusph::io::Snapshot::default();
     assert!(s.set_snapshot(&empty).unwrap_err().to_string().contains("no particles"));
     assert_eq!(s.len(), x.len() / 2);
