@@ -91,18 +91,28 @@ impl Heat<'_> {
         self.release(time, t, rate)
     }
 
-    /// Linearises the exchange with the outside and the source about these temperatures, for [`Heat::linear`].
+    /// Linearises the exchange with the outside and the source about these temperatures, for [`Heat::linear`]; answers the
+    /// source's part of it.
     ///
     /// # Errors
     /// As [`Heat::cooling`].
-    pub fn linearise_losses(&mut self, time: f64, t: &[f64]) -> Result<()> {
-        self.slopes = self.cooling(time, t)?;
-        let Some(surface) = self.surface else { return Ok(()) };
+    pub fn linearise_losses(&mut self, time: f64, t: &[f64]) -> Result<Vec<f64>> {
+        let cooling = self.cooling(time, t)?;
+        self.slopes = memory::copied("slopes", &cooling)?;
+        let Some(surface) = self.surface else { return Ok(cooling) };
         let (mut slopes, inverse) = (std::mem::take(&mut self.slopes), self.inverse_capacity);
         memory::extended("slopes", &mut slopes, t.len(), 0.0)?;
         surface.slopes(self.evaluated_kappa(), t, |i, slope| slopes[i] += slope * inverse[i]);
         self.slopes = slopes;
-        Ok(())
+        Ok(cooling)
+    }
+
+    /// m c_v of each particle; 0 where T is fixed.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn capacities(&self) -> Result<Vec<f64>> {
+        memory::collected("capacities", self.inverse_capacity.iter().map(|&inverse| capacity(inverse)))
     }
 
     /// How much faster each particle would cool per kelvin by the host's source, 1/s, from a difference; 0 where it heats

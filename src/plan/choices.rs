@@ -206,9 +206,8 @@ impl Choices {
         // Those that take sub-steps of any length look at their errors unless told otherwise.
         let by_error = auto.is_some() || (method.is_stabilised() && options.stages.is_none());
         let tolerance = tolerance(&mut words, by_error.then_some(auto::TOLERANCE))?;
-        if tolerance.is_some() && !line.contains("max_stages=") {
-            options.max_stages = CONTROLLED_STAGES;
-        }
+        let most = if tolerance.is_some() { CONTROLLED_STAGES } else { options.max_stages };
+        options.max_stages = words.count("max_stages", 3..=10_000)?.map_or(most, |most| most as u32);
         let preconditioner =
             choice("preconditioner", words.take("preconditioner").unwrap_or("auto"), &preconditioner::KNOWN)?;
         if preconditioner == Preconditioner::Multigrid && !operator.is_one_matrix() {
@@ -263,9 +262,6 @@ impl Choices {
 fn options(words: &mut Words, operator: &Operator, unstable: bool) -> Result<(Options, Promise)> {
     let mut options = Options { max_applications: 10_000_000, ..Options::default() };
     options.stages = words.count("stages", 1..=10_000)?.map(|s| s as u32);
-    if let Some(most) = words.count("max_stages", 3..=10_000)? {
-        options.max_stages = most as u32;
-    }
     // Beyond what it is positive for, only who insists gets weights of Espanol & Revenga.
     let able = operator.positive || (matches!(operator.tensor, Tensor::Angular(_)) && !unstable);
     let bounds = match words.take("bounds") {

@@ -59,9 +59,8 @@ impl System for Heat<'_> {
         }
         diagonal.iter_mut().zip(&circles).for_each(|(d, circle)| *d = circle.1);
         weight.iter_mut().zip(self.inverse_capacity).for_each(|(w, &i)| *w = heat::capacity(i));
-        self.linearise_losses(t, y)?;
-        // Those of the surface are in the circles.
-        let cooling = self.cooling(t, y)?;
+        // Losses at the surface are in the circles.
+        let cooling = self.linearise_losses(t, y)?;
         diagonal.iter_mut().zip(&cooling).for_each(|(d, c)| *d += c);
         Ok(if self.is_linear() { Linear::Exact } else { Linear::Frozen })
     }
@@ -83,7 +82,7 @@ impl System for Heat<'_> {
     }
 
     fn confine(&mut self, range: Range, most: f64, y: &mut [f64]) -> Result<bool> {
-        let capacities = memory::collected("capacities", self.inverse_capacity.iter().map(|&i| heat::capacity(i)))?;
+        let capacities = self.capacities()?;
         range.confine(self.parts()?, &capacities, most, y)
     }
 
@@ -135,7 +134,7 @@ impl Motion<'_> {
                     dt,
                     needed: needed * (dt / done),
                     allowed,
-                    remedy: self.remedy().into(),
+                    remedy: self.choices.method.remedy().into(),
                 });
             }
             let bounds = self.bounds(time + done, dt - done, t)?;
@@ -232,17 +231,9 @@ impl Motion<'_> {
                 // As many again for what is left, or one for each sub-step where nothing is done yet.
                 let ahead = if rest > 0.0 { rest / part } else { 0.0 };
                 let needed = (applications as f64 * dt / (dt - rest)).min(applications as f64 + ahead);
-                Error::StepTooLarge { dt, needed, allowed, remedy: self.remedy().into() }
+                Error::StepTooLarge { dt, needed, allowed, remedy: self.choices.method.remedy().into() }
             }
         })
-    }
-
-    /// What to do about a step that takes too many applications.
-    fn remedy(&self) -> &'static str {
-        match self.choices.method.is_implicit() || !self.choices.operator.dissipative {
-            true => "ask for less by a larger tolerance",
-            false => self.choices.method.remedy(),
-        }
     }
 
     /// An error of the integrator, which knows particles by their internal number.
@@ -371,7 +362,7 @@ impl Motion<'_> {
     /// Makes the operator linear about T; answers the capacities, in whose norm it is symmetric if it is at all.
     fn linearise_about(&mut self, time: f64, t: &[f64]) -> Result<Vec<f64>> {
         self.heat.linearise_losses(time, t)?;
-        memory::collected("capacities", self.heat.inverse_capacity.iter().map(|&i| heat::capacity(i)))
+        self.heat.capacities()
     }
 
     /// An operator whose modes grow is of no use, however small the step.

@@ -4,11 +4,12 @@ use super::choices::Promise;
 use super::input::Energy;
 use super::motion::explicit_limit;
 use super::state::{Input, Made, State};
-use super::{Plan, Report, rules};
+use super::{Choices, Plan, Report, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{Bounds, Range};
 use crate::memory;
 use crate::model::fields::{self, Slot};
+use crate::model::heat;
 use crate::operator::table::Tensor;
 use crate::sum;
 use std::sync::atomic::Ordering;
@@ -259,7 +260,7 @@ impl State {
     /// Σ m c_v |T − mean|
     fn unevenness(&self, t: &[f64]) -> f64 {
         let Some(inverse) = &self.inverse_capacity else { return 0.0 };
-        let capacity = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
+        let capacity = |i: usize| heat::capacity(inverse[i]);
         let total = sum::sum(&self.pool, t.len(), capacity);
         let mean = sum::sum(&self.pool, t.len(), |i| capacity(i) / total * t[i]);
         sum::sum(&self.pool, t.len(), |i| capacity(i) * (t[i] - mean).abs())
@@ -287,10 +288,11 @@ impl State {
 
     /// An error that names the step that the host asked for, whatever part of it failed, and advice that can be followed.
     fn of_whole_step(&self, error: Error, dt: f64) -> Error {
-        let again = "ask for less by a larger tolerance".to_string();
+        let Choices { method, auto, operator, .. } = &self.choices;
+        let no_other = auto.is_some() || method.is_implicit() || !operator.dissipative;
         match error {
             Error::StepTooLarge { needed, allowed, remedy, .. } => {
-                let remedy = if self.choices.auto.is_some() { again } else { remedy };
+                let remedy = if no_other { "ask for less by a larger tolerance".into() } else { remedy };
                 Error::StepTooLarge { dt, needed, allowed, remedy }
             }
             other => other,

@@ -18,7 +18,7 @@
 //! at right angles, so that edges and corners have it too.
 
 use super::facing::{Face, Faces};
-use super::{Cloud, Row, Scratch, rows::Rows};
+use super::{Cloud, ONE_SIDED, Row, Scratch, rows::Rows};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::memory;
@@ -36,10 +36,6 @@ const SEARCHES: usize = 60;
 /// Particles in the Morton cell that gives the first guess of the spacing.
 const CROWD: usize = 8;
 
-/// Mean directions to the neighbours longer than these are those of particles at a surface, in 1, 2 and 3 dimensions:
-/// the first and second layers of a square lattice have about 1 and 0.33, 0.54 and 0.22, 0.38 and 0.14, and disorder
-/// stays below 0.2.
-const ONE_SIDED: [f64; 3] = [0.6, 0.3, 0.25];
 /// How much better space must be filled by volumes of numbers for them to be taken.
 const FILLS: f64 = 0.8;
 
@@ -152,12 +148,7 @@ impl Count {
 
 /// Whether the neighbours within the support lie on one side.
 fn is_one_sided(row: &Row, kernel: &Kernel, h: f64) -> bool {
-    let (mut sum, mut count) = ([0.0; 3], 0);
-    for k in (0..row.len()).filter(|&k| row.r[k] > 0.0 && row.r[k] < kernel.radius() * h) {
-        sum.iter_mut().zip(row.direction(k)).for_each(|(sum, e)| *sum += e);
-        count += 1;
-    }
-    sum.iter().map(|s| s * s).sum::<f64>().sqrt() > ONE_SIDED[kernel.dim() - 1] * f64::from(count)
+    row.one_sidedness(kernel.radius() * h).is_some_and(|length| length > ONE_SIDED[kernel.dim() - 1])
 }
 
 /// Density of each particle with the given smoothing lengths.

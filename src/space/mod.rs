@@ -16,7 +16,7 @@ mod scratch;
 pub use cloud::Cloud;
 pub use domain::Domain;
 pub use nearest::Nearest;
-pub use scratch::{Row, Scratch};
+pub use scratch::{ONE_SIDED, Row, Scratch};
 
 /// At most 3 dimensions; unused axes are empty.
 pub type Axes<T> = [T; 3];

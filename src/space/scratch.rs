@@ -30,7 +30,22 @@ impl Row<'_> {
     pub fn is_empty(&self) -> bool {
         self.j.is_empty()
     }
+
+    /// The length of the mean direction to the neighbours within `reach`, to be compared with [`ONE_SIDED`]; none where
+    /// there are none.
+    pub fn one_sidedness(&self, reach: f64) -> Option<f64> {
+        let (mut sum, mut count) = ([0.0; 3], 0);
+        for k in (0..self.len()).filter(|&k| self.r[k] > 0.0 && self.r[k] < reach) {
+            sum.iter_mut().zip(self.direction(k)).for_each(|(sum, e)| *sum += e);
+            count += 1;
+        }
+        (count > 0).then(|| sum.iter().map(|s| s * s).sum::<f64>().sqrt() / f64::from(count))
+    }
 }
+
+/// Longer mean directions to the neighbours are those of particles at a surface, in 1, 2 and 3 dimensions: the first and
+/// second layers of a square lattice have about 1 and 0.33, 0.54 and 0.22, 0.38 and 0.14, and disorder stays below 0.2.
+pub const ONE_SIDED: [f64; 3] = [0.6, 0.3, 0.25];
 
 /// Candidates sifted together.
 const LANES: usize = 8;

@@ -10,11 +10,7 @@ use crate::error::Result;
 use crate::memory;
 use crate::pool::Pool;
 use crate::space::rows::Rows;
-use crate::space::{Cloud, Domain, Row, Scratch};
-
-/// Longer mean directions mean a surface, in 1, 2 and 3 dimensions. The first and second layers of a square lattice have
-/// 1 and 0.33, 0.54 and 0.22, 0.38 and 0.14.
-const THRESHOLD: [f64; 3] = [0.6, 0.3, 0.25];
+use crate::space::{Cloud, Domain, ONE_SIDED, Row, Scratch};
 
 /// Reach of the search, in spacings: between two shells of a lattice.
 const REACH: f64 = 2.9;
@@ -26,7 +22,8 @@ const REACH: f64 = 2.9;
 pub fn free(domain: &Domain, x: &[f64], spacing: &[f64]) -> Result<Vec<bool>> {
     let mut free = memory::filled("surface", spacing.len(), false)?;
     near(domain, x, spacing, |row, host, reach| {
-        free[host[row.i] as usize] = one_sidedness(row, reach) > THRESHOLD[domain.dim - 1];
+        // A particle that has none around it is all surface.
+        free[host[row.i] as usize] = row.one_sidedness(reach).unwrap_or(1.0) > ONE_SIDED[domain.dim - 1];
     })?;
     Ok(free)
 }
@@ -59,16 +56,6 @@ fn near(domain: &Domain, x: &[f64], spacing: &[f64], mut visit: impl FnMut(&Row,
     let rows = Rows::new(&cloud, &reach, 1.0, &pool)?;
     rows.visit(0..n, &mut Scratch::default(), |row| visit(&row, &cloud.host, reach[row.i]))?;
     Ok(())
-}
-
-/// The length of the mean direction to the neighbours within `reach`; 1 for a particle that has none.
-fn one_sidedness(row: &Row, reach: f64) -> f64 {
-    let (mut sum, mut count) = ([0.0; 3], 0);
-    for (k, &r) in row.r.iter().enumerate().filter(|(_, r)| **r > 0.0 && **r < reach) {
-        sum.iter_mut().zip(row.d).filter(|(_, d)| !d.is_empty()).for_each(|(sum, d)| *sum += d[k] / r);
-        count += 1;
-    }
-    if count == 0 { 1.0 } else { sum.iter().map(|s| s * s).sum::<f64>().sqrt() / f64::from(count) }
 }
 
 #[cfg(test)]
