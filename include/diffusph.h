@@ -1,7 +1,7 @@
 /*
  * diffusph: diffusion on SPH particles. The C interface.
  *
- * Made from the Rust sources by tests/header.rs; do not edit.
+ * Made from the Rust sources by tests/suite/header.rs; do not edit.
  *
  * Conventions, for every function:
  *

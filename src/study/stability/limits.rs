@@ -32,7 +32,7 @@ pub const CASES: &[Case] = &[
     },
     Case {
         number: 62,
-        title: "strides, counts and values that are wrong (NULL and overlaps in C: tests/abi.rs)",
+        title: "strides, counts and values that are wrong (NULL and overlaps in C: tests/suite/abi.rs)",
         required: "an error that names the argument, and nothing changed or written",
         source: "",
         trials: || vec![super::Trial::pass("")],

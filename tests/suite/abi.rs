@@ -1,10 +1,8 @@
 //! What a host can do wrong, in a table over every function of the header: each mistake is answered with its code and a
 //! message that names it, and changes nothing.
 
-mod common;
-
-use common::header;
-use common::host::{Host, LEN, N, c, message, read};
+use crate::common::header;
+use crate::common::host::{Host, LEN, N, c, message, read};
 use diffusph::ffi::*;
 use diffusph::io::{self, Data, Field, Snapshot};
 use std::collections::BTreeSet;

@@ -1,11 +1,9 @@
 //! A run that is taken up from a snapshot goes on to the bit; what a snapshot cannot hold is refused; planes of files keep
 //! their place.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::io::{self, Data, Field, Series, Snapshot};
 use diffusph::{Solver, Strided};
-use particles::*;
 use std::path::Path;
 
 fn all(s: &mut Solver) -> Vec<Vec<u64>> {

@@ -1,5 +1,4 @@
 //! The program, used as a user would.
-#![cfg(feature = "cli")]
 
 use diffusph::io::{self, Series};
 use serde_json::Value;

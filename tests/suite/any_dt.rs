@@ -1,12 +1,10 @@
 //! Whatever dt a host gives: the error in time is what the words promise, it does not fall when dt grows, T stays between
 //! its bounds, and what cannot be done is refused before minutes of work.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::Solver;
 use diffusph::integrator::METHODS;
 use nalgebra::{DMatrix, DVector};
-use particles::*;
 use std::f64::consts::PI;
 
 const SIDE: usize = 14;

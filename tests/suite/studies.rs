@@ -1,5 +1,4 @@
 //! Every study, at its smallest, as a user would ask for it: its files, and numbers that are known from elsewhere.
-#![cfg(feature = "cli")]
 
 use serde_json::Value;
 use std::collections::HashMap;

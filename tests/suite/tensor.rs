@@ -1,10 +1,8 @@
 //! Conductivity that depends on direction: exact answers, and what each operator promises.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::Solver;
 use diffusph::study::exact::space::Contact;
-use particles::*;
 use std::f64::consts::PI;
 
 /// kappa 1 along a direction at `degrees` to the first axis and `perp` across, on particles in the periodic unit square.

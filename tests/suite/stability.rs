@@ -1,5 +1,4 @@
 //! The stability suite, as `diffusph study stability` runs it.
-#![cfg(feature = "cli")]
 
 use diffusph::study::stability::{self, Row, Verdict};
 use std::process::Command;

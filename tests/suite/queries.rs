@@ -1,8 +1,6 @@
 //! What the C ABI tells: the log, texts in short buffers, catalogues, versions, series of files.
 
-mod common;
-
-use common::host::{Host, c, created, message, read, user};
+use crate::common::host::{Host, c, created, message, read, user};
 use diffusph::ffi::*;
 use std::ffi::{c_char, c_void};
 use std::ptr::{null, null_mut};

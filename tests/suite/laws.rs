@@ -1,10 +1,8 @@
 //! Laws that hold for every operator, kernel and dimension: conservation, constants, positivity, consistency, and
 //! independence of order, threads, place, orientation and units.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::{Solver, Strided};
-use particles::*;
 use std::f64::consts::PI;
 
 const COUNTS: [usize; 3] = [200, 20, 10];

@@ -1,12 +1,10 @@
 //! Boundaries, sources and laws of conductivity, each against an exact steady or transient solution.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::study::exact::slab::{Cooling, Slab};
 use diffusph::study::exact::space::{Barenblatt, Contact};
 use diffusph::study::exact::steady::{Layers, Shell, radiative_cooling};
 use diffusph::{Solver, Strided};
-use particles::*;
 use std::f64::consts::PI;
 
 const SLAB: Slab = Slab { a: 0.0, b: 1.0, kappa: 1.0, capacity: 1.0 };

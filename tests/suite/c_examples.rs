@@ -1,9 +1,7 @@
 //! The hosts in `c_examples` are built by make and by CMake against an installed library; they check their own answers, and
 //! valgrind checks their memory and ours.
 
-mod common;
-
-use common::{installed, root, run, succeed};
+use crate::common::{installed, root, run, succeed};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -86,7 +84,7 @@ fn the_installed_library_is_like_any_other() {
     // It exports what the header has, and nothing else.
     let exported = succeed(Command::new("nm").args(["-D", "--defined-only"]).arg(file("libdiffusph.so")));
     let mut exported: Vec<&str> = exported.lines().filter_map(|l| l.split_whitespace().nth(2)).collect();
-    let mut functions: Vec<String> = common::header::functions().into_iter().map(|f| f.name).collect();
+    let mut functions: Vec<String> = crate::common::header::functions().into_iter().map(|f| f.name).collect();
     exported.sort_unstable();
     functions.sort_unstable();
     assert_eq!(exported, functions);

@@ -1,10 +1,8 @@
 //! The Fortran module says the same as the header: gfortran prints the C prototypes of its interfaces, which are compared
 //! with the header's, and a program of both languages compares the report in memory.
 
-mod common;
-
-use common::header::{self, Argument, Function};
-use common::{installed, root, succeed};
+use crate::common::header::{self, Argument, Function};
+use crate::common::{installed, root, succeed};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;

@@ -1,10 +1,8 @@
 //! What a host gives is kept as it gave it: nothing turns into a default without a word, one quantity does not change another,
 //! a call that fails leaves no trace, and the order of the host's particles leaves none either.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::{Solver, Strided};
-use particles::*;
 
 fn place(s: &mut Solver, x: &[f64]) -> diffusph::error::Result<()> {
     let dim = s.dim();

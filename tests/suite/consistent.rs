@@ -1,8 +1,6 @@
 //! Moment-consistent weights: exact for polynomials, of high order on disordered particles.
 
-mod particles;
-
-use particles::*;
+use crate::particles::*;
 use std::f64::consts::PI;
 
 /// A smooth function of place with a hump in every direction, and the sum of its second derivatives.

@@ -1,9 +1,7 @@
 //! The header is what cbindgen makes of `src/ffi`, and C and C++ compilers accept it in every dialect with every warning.
 //! `DIFFUSPH_BLESS=1` writes it anew.
 
-mod common;
-
-use common::{header, root, run};
+use crate::common::{header, root, run};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 

@@ -1,8 +1,6 @@
 //! The operator `projected`: conservative, monotone and exact for quadratics at once, on disordered particles.
 
-mod particles;
-
-use particles::*;
+use crate::particles::*;
 use std::f64::consts::PI;
 
 const NEIGHBOURHOODS: [(usize, usize, &str); 3] =

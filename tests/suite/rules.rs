@@ -1,7 +1,6 @@
 //! Each rule of the plan, on and off: the plan names it, the answer stays the same, and there is less work with it.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::kernel::Kernel;
 use diffusph::model::fields;
 use diffusph::model::heat::{Conductivity, Release};
@@ -13,7 +12,6 @@ use diffusph::plan::rules::{self, RULES, Rule, Same};
 use diffusph::plan::state::State;
 use diffusph::plan::{Choices, Plan};
 use diffusph::{Solver, Strided};
-use particles::*;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 struct Scene {

@@ -1,10 +1,8 @@
 //! `tolerance=`: what it promises for every integrator, what it rejects, and that it ends.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::Solver;
 use diffusph::plan::Report;
-use particles::*;
 use std::f64::consts::PI;
 
 /// Nonlinear, heated, jittered: kappa = T^2.5 with a source, 400 particles.

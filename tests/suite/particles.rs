@@ -1,5 +1,4 @@
 //! Particles and solvers that several tests use.
-#![allow(dead_code)] // Each test binary uses its own part of this.
 
 use diffusph::{Solver, Strided};
 use std::f64::consts::PI;

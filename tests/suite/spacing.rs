@@ -1,10 +1,8 @@
 //! Particles that are not a cubic lattice: squeezed, graded, thin, open, disordered. `normalise=tensor` conducts alike in
 //! all directions that there are, which `normalise=pair` does not.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::{Solver, Strided};
-use particles::*;
 use std::f64::consts::PI;
 
 /// A solver on a lattice of so many particles per axis, so far apart, each moved by up to `jitter` spacings; periodic as

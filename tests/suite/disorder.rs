@@ -1,10 +1,8 @@
 //! What disorder and free surfaces do to the operators, and why weights of pairs are normalised: on lattices, jittered
 //! lattices, a glass and a dam break, with real particles from another code (tests/data).
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::Solver;
-use particles::*;
 use std::f64::consts::PI;
 
 fn data(name: &str) -> diffusph::io::Snapshot {

@@ -1,11 +1,9 @@
 //! Implicit integrators on particles: bounds and energy at any step, orders, steady states in one step, nonlinear laws.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::Solver;
 use diffusph::study::exact::slab::Slab;
 use diffusph::study::exact::steady::radiative_cooling;
-use particles::*;
 use std::f64::consts::PI;
 
 const METHODS: [&str; 3] = ["backward-euler", "crank-nicolson", "sdirk2"];

@@ -3,11 +3,9 @@
 //! The front is the outermost particle with T above 1e-3 of the largest: for kappa ~ T^n the profile is so steep there
 //! that the exact one reaches this T within 1e-7 of its radius.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::study::exact::space::Barenblatt;
 use diffusph::{Solver, Strided};
-use particles::*;
 
 const SIDE: f64 = 5.2;
 const TIMES: (f64, f64) = (0.01, 1.0);

@@ -1,10 +1,8 @@
 //! The multigrid preconditioner of implicit integrators: few iterations at any number of particles, the answer of the
 //! diagonal, and scenes in which some particles couple to few or to none.
 
-mod particles;
-
+use crate::particles::*;
 use diffusph::Solver;
-use particles::*;
 
 const STIFF: f64 = 1e6;
 

@@ -1,0 +1,34 @@
+//! Every test of whole behaviour that can share a process: one program, so that the library is linked once.
+
+#[path = "../common/mod.rs"]
+mod common;
+mod particles;
+
+mod abi;
+mod adaptive;
+mod any_dt;
+mod boundaries;
+mod c_examples;
+mod consistent;
+mod disorder;
+mod floors;
+mod fortran;
+mod given;
+mod header;
+mod implicit;
+mod laws;
+mod multigrid;
+mod nonlinear;
+#[cfg(feature = "cli")]
+mod program;
+mod projected;
+mod queries;
+mod restart;
+mod rules;
+mod spacing;
+#[cfg(feature = "cli")]
+mod stability;
+#[cfg(feature = "cli")]
+mod studies;
+mod tensor;
+mod vtk_matrix;
