@@ -320,13 +320,14 @@ impl State {
     /// it is wanted. Needs the geometry.
     ///
     /// # Errors
-    /// `NoMemory`.
+    /// `NoMemory`; `BadElement` where spacing differs by direction.
     pub fn areas(&self, wanted: impl Fn(usize) -> bool + Sync + Send) -> Result<Vec<f64>> {
         if self.inputs[fields::AREA] != Input::Unset {
             return self.each(fields::AREA);
         }
         let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
-        self.with_rows(|rows| facing::areas(&self.choices.kernel, rows, volume, wanted, &self.pool))
+        let host = |i: usize| self.host(i);
+        self.with_rows(|rows| facing::areas(&self.choices.kernel, rows, volume, wanted, host, &self.pool))
     }
 
     /// How deep a particle's centre lies below its area: as given, or half a spacing. Needs the geometry.

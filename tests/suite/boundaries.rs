@@ -539,6 +539,42 @@ fn areas_that_face_outside_are_those_of_bodies() {
 }
 
 #[test]
+fn areas_of_squeezed_bodies_are_refused_and_of_disordered_ones_are_not() {
+    let body = |dim: usize, axis: usize, squeezed: f64, jitter: f64, seed: u64| {
+        let mut random = Random(seed);
+        let side = if dim == 2 { 16 } else { 9 };
+        let step = |a: usize| if a == axis { 1.0 / squeezed } else { 1.0 };
+        let mut place = |i: usize, a: usize| (f64::from(i as u32) + jitter * random.next()) * step(a);
+        let x: Vec<f64> = (0..side * side * if dim == 3 { side } else { 1 })
+            .flat_map(|i| [i % side, i / side % side, i / (side * side)].into_iter().enumerate().take(dim))
+            .map(|(a, i)| place(i, a))
+            .collect();
+        let mut s = unit_box("", &x, dim, false);
+        s.set_number("m", 1.0 / squeezed).unwrap();
+        s.set_number("T", 1.0).unwrap();
+        s.set_number("h_conv", 1.0).unwrap();
+        s
+    };
+    for (dim, axis, seed) in [(2, 0, 1), (2, 1, 2), (3, 0, 3), (3, 1, 4), (3, 2, 5)] {
+        for jitter in [0.0, 0.1, 0.2] {
+            let mut alike = body(dim, axis, 1.0, jitter, seed);
+            assert!(alike.step(1e-4).is_ok() && alike.get_all("area").is_ok(), "{dim}-D {jitter}");
+            for squeezed in [2.0, 3.0, 5.0] {
+                let mut s = body(dim, axis, squeezed, jitter, seed);
+                for text in [s.step(1e-4).unwrap_err().to_string(), s.get_all("area").unwrap_err().to_string()] {
+                    assert!(
+                        text.contains("area") && text.contains("along the surface"),
+                        "{dim}-D {axis} {squeezed} {jitter} {text}"
+                    );
+                }
+                s.set_number("area", 0.1).unwrap();
+                s.step(1e-4).unwrap();
+            }
+        }
+    }
+}
+
+#[test]
 fn thin_bodies_and_ends_face_outside_and_what_lies_inside_does_not() {
     let areas = |x: &[f64], dim: usize, words: &str| {
         let mut s = unit_box(words, x, dim, false);
