@@ -126,5 +126,10 @@ pub fn catalogue() -> impl Iterator<Item = (&'static str, &'static str)> {
     KERNELS.iter().map(|row| (row.name, row.about))
 }
 
+/// h over particle spacing of each kernel, unless told otherwise.
+pub fn own_h_fac() -> impl Iterator<Item = (&'static str, f64)> {
+    KERNELS.iter().map(|row| (row.name, row.h_fac))
+}
+
 #[cfg(test)]
 mod tests;

@@ -18,6 +18,9 @@ use crate::model::fields;
 const LIGHT: &str = "rkl2";
 const HEAVY: &str = "sdirk2";
 
+/// As the list of integrators has it.
+pub const ABOUT: &str = "for each step, from how stiff it is, rkl2 or, for the stiffest, sdirk2, at tolerance=1e-3; keeps bounds where the operator does";
+
 /// The stiffness, in explicit limits, where the second needs less work: with a tolerance, and without.
 const CONTROLLED: f64 = 9e4;
 const FREE: f64 = 500.0;

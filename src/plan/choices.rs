@@ -13,15 +13,13 @@ use crate::operator::table::{self, Tensor};
 use crate::operator::{Mean, Normalise, Operator};
 use crate::words::{Words, choice};
 
-/// Every word with its meaning and default, as `list words` prints it.
+/// Every word with its meaning and default, as `list words` prints it. `{kernels}`, `{operators}` and `{integrators}` stand
+/// for the names in those tables.
 pub static WORDS: &[(&str, &str)] = &[
     ("dim", "dimensions: 1, 2 or 3 (default 3)"),
-    ("kernel", "M4, M5, M6, M7, M8, M6/2, C2, C4, C6, Lucy or Gaussian (default M6)"),
-    ("h_fac", "smoothing length over particle spacing (default: the kernel's own)"),
-    (
-        "operator",
-        "brookshaw, kernel, direct or consistent; espanol-revenga, espanol-revenga-kernel, two-first, limited or monotone, which take a tensor kappa too (default brookshaw)",
-    ),
+    ("kernel", "{kernels} (default M6)"),
+    ("h_fac", "smoothing length over particle spacing (default: the kernel's own, of {h_fac})"),
+    ("operator", "{operators}; a tensor kappa is taken by {tensors} (default brookshaw)"),
     ("order", "of consistent: exact for polynomials of degree 2, 4 or 6 (default 4)"),
     ("theta", "of two-first and limited: penalty on jumps that the gradients do not explain, 0 for none (default 1)"),
     (
@@ -40,10 +38,7 @@ pub static WORDS: &[(&str, &str)] = &[
         "mean",
         "of kappa between two particles: harmonic, which jumps of kappa need, arithmetic, which fronts of kappa(T) into the cold need, for the others are 0 where one kappa is, or geometric (default harmonic; kappa(T): arithmetic)",
     ),
-    (
-        "integrator",
-        "euler, ssprk2, ssprk3, rk4, rkl1, rkl2, backward-euler, crank-nicolson or sdirk2; auto: rkl2 or, for the stiffest steps, sdirk2, at tolerance=1e-3 (default auto)",
-    ),
+    ("integrator", "{integrators} (default auto)"),
     ("stages", "pins the number of stages of rkl1 and rkl2 (default: as many as dt needs)"),
     (
         "change",

@@ -8,6 +8,7 @@ use crate::model::conductivity::LAWS;
 use crate::model::fields::{Access, FIELDS, NUMBERS};
 use crate::operator::mean::MEANS;
 use crate::operator::table::OPERATORS;
+use crate::plan::auto;
 use crate::plan::choices::WORDS;
 use crate::plan::rules::RULES;
 
@@ -23,11 +24,11 @@ type List = fn() -> Vec<Item>;
 /// Every catalogue.
 pub static CATALOGUES: &[(&str, List)] = &[
     ("models", || MODELS.iter().map(|m| item(m.name, m.about)).collect()),
-    ("words", || WORDS.iter().map(|(name, about)| item(name, *about)).collect()),
+    ("words", || WORDS.iter().map(|(name, about)| item(name, filled_in(about))).collect()),
     ("kernels", || kernel::catalogue().map(|(name, about)| item(name, about)).collect()),
     ("operators", || OPERATORS.iter().map(|o| item(o.name, o.about)).collect()),
     ("means", || MEANS.iter().map(|(name, _, about)| item(name, *about)).collect()),
-    ("integrators", || METHODS.iter().map(|m| item(m.name, m.about)).collect()),
+    ("integrators", || integrators().map(|(name, about)| item(name, about)).collect()),
     ("laws", || LAWS.iter().map(|(name, about)| item(name, *about)).collect()),
     ("fields", fields),
     ("numbers", || NUMBERS.iter().map(|n| item(n.name, format!("{} [{}]", n.about, n.unit))).collect()),
@@ -48,6 +49,27 @@ fn item(name: &str, about: impl Into<String>) -> Item {
     Item { name: name.into(), about: about.into() }
 }
 
+fn integrators() -> impl Iterator<Item = (&'static str, &'static str)> {
+    METHODS.iter().map(|m| (m.name, m.about)).chain([("auto", auto::ABOUT)])
+}
+
+/// What a word means, with the names that the tables have today.
+fn filled_in(about: &str) -> String {
+    let join = |names: Vec<&str>| names.join(", ");
+    let own = |(name, h_fac): (&str, f64)| format!("{name} {h_fac}");
+    let mut text = about.to_string();
+    for (hole, names) in [
+        ("{kernels}", join(kernel::catalogue().map(|k| k.0).collect())),
+        ("{h_fac}", kernel::own_h_fac().map(own).collect::<Vec<_>>().join(", ")),
+        ("{operators}", join(OPERATORS.iter().map(|o| o.name).collect())),
+        ("{tensors}", join(OPERATORS.iter().filter(|o| o.takes_tensors()).map(|o| o.name).collect())),
+        ("{integrators}", join(integrators().map(|i| i.0).collect())),
+    ] {
+        text = text.replace(hole, &names);
+    }
+    text
+}
+
 fn fields() -> Vec<Item> {
     let about = |f: &crate::model::fields::Field| match f.access {
         Access::Input { default: Some(v), .. } => format!("{} [{}], set or get, default {v}", f.about, f.unit),
@@ -61,6 +83,7 @@ fn fields() -> Vec<Item> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::solver::Solver;
 
     #[test]
     fn every_item_has_a_unique_name_and_says_what_it_is() {
@@ -70,6 +93,15 @@ mod tests {
             for (i, item) in items.iter().enumerate() {
                 assert!(!item.name.is_empty() && !item.about.is_empty(), "{name} {item:?}");
                 assert!(items[..i].iter().all(|other| other.name != item.name), "{name} {item:?} twice");
+            }
+        }
+        let words = catalogue("words").unwrap();
+        assert!(words.iter().all(|word| !word.about.contains(['{', '}'])), "a name that is in no table");
+        for (word, list) in [("kernel", "kernels"), ("operator", "operators"), ("integrator", "integrators")] {
+            let about = &words.iter().find(|w| w.name == word).unwrap().about;
+            for item in catalogue(list).unwrap() {
+                assert!(about.contains(&item.name), "{word} does not say {}", item.name);
+                Solver::new(&format!("heat {word}={}", item.name)).unwrap();
             }
         }
         assert!(catalogue("kernel").unwrap_err().to_string().contains("'kernels'"));

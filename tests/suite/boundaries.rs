@@ -559,7 +559,8 @@ fn areas_of_squeezed_bodies_are_refused_and_of_disordered_ones_are_not() {
         for jitter in [0.0, 0.1, 0.2] {
             let mut alike = body(dim, axis, 1.0, jitter, seed);
             assert!(alike.step(1e-4).is_ok() && alike.get_all("area").is_ok(), "{dim}-D {jitter}");
-            for squeezed in [2.0, 3.0, 5.0] {
+            // Where jitter reaches over five neighbours there is no direction left to see.
+            for squeezed in [2.0, 3.0, 5.0].into_iter().filter(|s| s * jitter < 1.0) {
                 let mut s = body(dim, axis, squeezed, jitter, seed);
                 for text in [s.step(1e-4).unwrap_err().to_string(), s.get_all("area").unwrap_err().to_string()] {
                     assert!(
