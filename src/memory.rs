@@ -33,6 +33,13 @@ pub fn extended<T: Clone>(what: &str, v: &mut Vec<T>, n: usize, value: T) -> Res
     Ok(())
 }
 
+/// Appends an item, or `NoMemory`.
+pub fn pushed<T>(what: &str, v: &mut Vec<T>, item: T) -> Result<()> {
+    v.try_reserve(1).map_err(|_| no_memory::<T>(what, v.len() + 1))?;
+    v.push(item);
+    Ok(())
+}
+
 /// An empty array with room for exactly `n`, or `NoMemory`.
 pub fn reserved<T>(what: &str, n: usize) -> Result<Vec<T>> {
     let mut v = Vec::new();

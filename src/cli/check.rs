@@ -7,7 +7,7 @@ use crate::model::fields::{Access, FIELDS};
 use crate::pool::Pool;
 use crate::solver::Solver;
 use crate::space::rows::Rows;
-use crate::space::{Cloud, Domain, Scratch};
+use crate::space::{Cloud, Domain, Scratch, density};
 use std::fmt::Write;
 use std::path::Path;
 
@@ -109,18 +109,32 @@ fn spacing(x: &[f64], dim: usize) -> Result<Option<(f64, f64)>> {
     if volume == 0.0 {
         return Ok(Some((0.0, 0.0))); // all in one place
     }
-    let mut reach = 2.0 * (volume / n as f64).powf(1.0 / dim as f64);
+    let mut cloud = Cloud::sort(&Domain::open(dim), x, 2.0 * (volume / n as f64).powf(1.0 / dim as f64), &pool)?;
+    let mut h = density::guess(&cloud, 2.0)?;
+    // One particle far away makes for cells in which all others are.
+    let least = |h: &[f64]| h.iter().copied().fold(f64::INFINITY, f64::min);
+    while cloud.is_coarse_for(least(&h)) {
+        let before = std::mem::replace(&mut cloud, Cloud::sort(&Domain::open(dim), x, least(&h), &pool)?);
+        h = density::guess(&cloud, 2.0)?;
+        if cloud.grid.edge >= before.grid.edge {
+            break;
+        }
+    }
     let mut found = vec![f64::INFINITY; n];
     // Particles without a neighbour yet are given a wider search.
     while found.contains(&f64::INFINITY) {
-        let cloud = Cloud::sort(&Domain::open(dim), x, reach, &pool)?;
-        let h = vec![reach; n];
         let rows = Rows::new(&cloud, &h, 1.0, &pool)?;
-        rows.visit(0..n, &mut Scratch::default(), |row| {
-            found[row.i] = row.r.iter().copied().fold(f64::INFINITY, f64::min);
-        })?;
-        reach *= 2.0;
-        if !reach.is_finite() {
+        let open: Vec<bool> = found.iter().map(|r| r.is_infinite()).collect();
+        rows.visit_where(
+            0..n,
+            &mut Scratch::default(),
+            |i| open[i],
+            |row| {
+                found[row.i] = row.r.iter().copied().fold(f64::INFINITY, f64::min);
+            },
+        )?;
+        h.iter_mut().zip(&found).filter(|(_, r)| r.is_infinite()).for_each(|(h, _)| *h *= 2.0);
+        if h.iter().any(|h| h.is_infinite()) {
             return Err(Error::bad("x", "too far apart", "no neighbour can be found"));
         }
     }

@@ -2,7 +2,7 @@
 //! runs only where its product is missing.
 
 use super::motion::Motion;
-use super::state::{Directions, Geometry, Input, State, Weights};
+use super::state::{Directions, Geometry, Input, State, Weights, least};
 use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
 use crate::integrator::Range;
@@ -142,18 +142,33 @@ impl State {
         // The search for h reaches as far as it may be expected to be; what is found decides on the order that stays.
         let reach = self.reach(&self.domain, self.len(), |axis| self.extent(axis));
         self.sort_for(reach)?;
+        let start = match self.last_h.len() == self.len() {
+            true => memory::collected("h", self.cloud(call)?.host.iter().map(|&host| self.last_h[host as usize]))?,
+            false => self.guessed_lengths(call)?,
+        };
         let m = self.each(fields::M)?;
         let cloud = self.cloud(call)?;
-        let last = |&host: &u32| self.last_h[host as usize];
-        let start = match self.last_h.len() == cloud.len() {
-            true => memory::collected("h", cloud.host.iter().map(last))?,
-            false => density::guess(cloud, self.choices.h_fac)?,
-        };
         let h = density::smoothing_lengths(&self.choices.kernel, self.choices.h_fac, cloud, &m, start, &self.pool)?;
         let mut by_host = memory::filled("h", cloud.len(), 0.0)?;
         cloud.host.iter().zip(&h).for_each(|(&host, &h)| by_host[host as usize] = h);
         self.found_h = by_host;
         Ok(h)
+    }
+
+    /// A first guess of h, from cells that are not crowded by far: where one particle far away made them too long, from
+    /// shorter ones.
+    fn guessed_lengths(&mut self, call: &str) -> Result<Vec<f64>> {
+        loop {
+            let h = density::guess(self.cloud(call)?, self.choices.h_fac)?;
+            let (reach, before) = (self.choices.kernel.radius() * least(&h), self.cloud(call)?.grid.edge);
+            if !self.cloud(call)?.is_coarse_for(reach) {
+                return Ok(h);
+            }
+            self.sort_again(reach)?;
+            if self.cloud(call)?.grid.edge >= before {
+                return density::guess(self.cloud(call)?, self.choices.h_fac);
+            }
+        }
     }
 
     /// `found`: h was found together with rho, and tells it.
@@ -162,8 +177,9 @@ impl State {
         let mut h = self.lengths(nu)?;
         let reach = radius * h.iter().copied().fold(0.0, f64::max);
         self.refuse_flat(reach)?;
-        if !self.cloud(call)?.suits(reach) {
-            self.sort_for(reach)?;
+        let shortest = radius * least(&h);
+        if !self.cloud(call)?.suits(shortest) {
+            self.sort_for(shortest)?;
             h = self.lengths(nu)?;
         }
         let m = self.each(fields::M)?;

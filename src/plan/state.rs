@@ -182,12 +182,12 @@ impl State {
         self.cloud.as_ref().ok_or_else(|| Error::OutOfOrder { call: call.into(), missing: "set_particles".into() })
     }
 
-    /// How far a search will reach, as far as that is known before smoothing lengths are: the same for the same
+    /// The shortest distance that a search will reach, as far as that is known before smoothing lengths are: the same for the same
     /// particles, whatever was asked before.
     pub fn reach(&self, domain: &Domain, n: usize, extent: impl Fn(usize) -> f64) -> f64 {
         let radius = self.choices.kernel.radius();
         if self.last_h.len() == n && n > 0 {
-            return radius * self.last_h.iter().copied().fold(0.0, f64::max);
+            return radius * least(&self.last_h);
         }
         let length = |axis: usize| if domain.periodic[axis] { domain.length(axis) } else { extent(axis).max(0.0) };
         let volume: f64 = (0..self.dim()).map(length).product();
@@ -445,4 +445,9 @@ impl State {
             + self.multigrid.bytes()
             + self.work.bytes()
     }
+}
+
+/// The shortest of some lengths.
+pub(super) fn least(h: &[f64]) -> f64 {
+    h.iter().copied().fold(f64::INFINITY, f64::min)
 }

@@ -15,6 +15,9 @@ const CUTS: i32 = 2;
 /// how far the search goes, and not on which search came before.
 const REACHES: f64 = 16.0;
 
+/// Cells that are longer by this than the search needs, in 3-D, hold 512 times as many particles.
+const COARSE: f64 = 0.125;
+
 /// Positions sorted along a Morton curve. Ties are broken by coordinates, then by host index; who has data of the
 /// particles breaks them by those first: [`Cloud::reorder`].
 #[derive(Debug, Clone)]
@@ -39,25 +42,76 @@ pub struct Grid {
     pub dim: usize,
     pub lo: Axes<f64>,
     pub edge: f64,
+    /// Where cells as fine as the search needs would not fit a key: the parts of each axis on which particles are, so that
+    /// one particle far away does not put all others into one cell.
+    stretches: Axes<Vec<Stretch>>,
+}
+
+/// A part of an axis, up to the next one: where it begins, and the coordinate of its first cell.
+#[derive(Debug, Clone, PartialEq)]
+struct Stretch {
+    from: f64,
+    cell: u64,
 }
 
 impl Grid {
-    /// Cells so that `reach` is a whole number of them; coarser where the extent would not fit a key.
-    fn new(domain: &Domain, lo: Axes<f64>, hi: Axes<f64>, reach: f64) -> Grid {
-        let extent = (0..domain.dim).map(|a| hi[a] - lo[a]).fold(0.0, f64::max);
-        let mut edge = reach * 0.5f64.powi(CUTS);
-        let room = 2f64.powi(morton::bits(domain.dim) as i32 - 1);
-        if edge.is_nan() || edge <= extent / room {
-            let doublings = if edge > 0.0 { (extent / room / edge).log2().ceil() } else { f64::INFINITY };
-            edge = if doublings < 1000.0 { edge * 2f64.powi(doublings as i32) } else { extent / room };
+    /// Cells so that `reach` is a whole number of them. Where the extent would not fit a key, empty parts of the axes are
+    /// left out (`sorted` has the coordinates on an axis, in order), and cells are no coarser than what is left needs.
+    fn new(
+        domain: &Domain,
+        (lo, hi): (Axes<f64>, Axes<f64>),
+        reach: f64,
+        sorted: impl Fn(usize) -> Result<Vec<f64>>,
+    ) -> Result<Grid> {
+        let dim = domain.dim;
+        let extent = (0..dim).map(|a| hi[a] - lo[a]).fold(0.0, f64::max);
+        let fine = reach * 0.5f64.powi(CUTS);
+        let room = 2f64.powi(morton::bits(dim) as i32 - 1);
+        let mut grid = Grid { dim, lo, edge: fine, stretches: Default::default() };
+        if fine.is_nan() || fine <= extent / room {
+            let doublings = if fine > 0.0 { (extent / room / fine).log2().ceil() } else { f64::INFINITY };
+            if doublings < 1000.0 {
+                grid.leave_gaps_out(doublings as i32, |axis| if axis < dim { sorted(axis) } else { Ok(Vec::new()) })?;
+            } else {
+                grid.edge = extent / room;
+            }
         }
-        Grid { dim: domain.dim, lo, edge: edge.max(f64::MIN_POSITIVE) }
+        grid.edge = grid.edge.max(f64::MIN_POSITIVE);
+        Ok(grid)
+    }
+
+    /// The least number of doublings of the edge, up to one that is enough for the whole extent, for which the stretches
+    /// fit a key.
+    fn leave_gaps_out(&mut self, enough: i32, sorted: impl Fn(usize) -> Result<Vec<f64>>) -> Result<()> {
+        let (fine, last) = (self.edge, last_cell(self.dim));
+        let axes = [sorted(0)?, sorted(1)?, sorted(2)?];
+        let fits = |doublings: i32| {
+            axes.iter().all(|x| stretch(x, fine * 2f64.powi(doublings), |_| Ok(())).is_ok_and(|end| end <= last))
+        };
+        let (mut low, mut high) = (0, enough);
+        while low < high {
+            let middle = (low + high) / 2;
+            if fits(middle) { high = middle } else { low = middle + 1 }
+        }
+        self.edge = fine * 2f64.powi(high);
+        if high < enough {
+            for (list, x) in self.stretches.iter_mut().zip(&axes) {
+                stretch(x, self.edge, |s| memory::pushed("the search's grid", list, s))?;
+            }
+        }
+        Ok(())
     }
 
     /// The fine cell coordinate of a position on an axis: a monotone function, clamped to the grid.
     pub fn coordinate(&self, axis: usize, x: f64) -> u64 {
-        let last = (1u64 << morton::bits(self.dim)) - 1;
-        (((x - self.lo[axis]) / self.edge) as u64).min(last)
+        let (stretches, mut from, mut cell, mut end) = (&self.stretches[axis], self.lo[axis], 0, last_cell(self.dim));
+        if !stretches.is_empty() {
+            let next = stretches.partition_point(|s| s.from <= x);
+            let Some(own) = next.checked_sub(1).map(|k| &stretches[k]) else { return 0 };
+            (from, cell) = (own.from, own.cell);
+            end = stretches.get(next).map_or(end, |s| s.cell - 1);
+        }
+        (((x - from) / self.edge) as u64).saturating_add(cell).min(end)
     }
 
     /// The Morton key of the fine cell of a position.
@@ -68,6 +122,24 @@ impl Grid {
         }
         morton::key(self.dim, cell)
     }
+}
+
+fn last_cell(dim: usize) -> u64 {
+    (1u64 << morton::bits(dim)) - 1
+}
+
+/// Cuts an axis with these coordinates, in order, where nothing is for twice a reach; answers how many cells are left, a
+/// reach beyond each stretch included.
+fn stretch(x: &[f64], edge: f64, mut found: impl FnMut(Stretch) -> Result<()>) -> Result<u64> {
+    let reach = 1u64 << CUTS;
+    let wide = |a: f64, b: f64| b - a > 2.0 * reach as f64 * edge;
+    let mut cell = 0u64;
+    for part in x.chunk_by(|a, b| !wide(*a, *b)) {
+        let (from, to) = (part[0], part[part.len() - 1]);
+        found(Stretch { from, cell })?;
+        cell = cell.saturating_add(((to - from) / edge) as u64).saturating_add(1 + reach);
+    }
+    Ok(cell)
 }
 
 impl Cloud {
@@ -81,9 +153,13 @@ impl Cloud {
             return Err(Error::bad("n", x.len(), "at most 2^32 - 2 particles per solver"));
         }
         x.check("x", "coordinates must be finite", f64::is_finite)?;
-        let (lo, hi) = bounds(domain, x);
         let reach = rounded(reach);
-        let grid = Grid::new(domain, lo, hi, reach);
+        let grid = Grid::new(domain, bounds(domain, x), reach, |axis| {
+            let wrapped = (0..x.len()).map(|i| domain.wrap(axis, x.at(i, axis)));
+            let mut sorted = memory::collected("coordinates", wrapped)?;
+            sorted.sort_unstable_by(f64::total_cmp);
+            Ok(sorted)
+        })?;
         let position = |i: usize| {
             let mut p = [0.0; 3];
             for (axis, value) in p.iter_mut().enumerate().take(domain.dim) {
@@ -127,6 +203,11 @@ impl Cloud {
     pub fn suits(&self, reach: f64) -> bool {
         let reach = rounded(reach);
         self.reach == reach || (self.reach.is_nan() && reach.is_nan())
+    }
+
+    /// Whether cells are so much longer than this reach that all work would be in looking through them.
+    pub fn is_coarse_for(&self, reach: f64) -> bool {
+        reach < COARSE * self.reach
     }
 
     /// Whether two particles have the same coordinates to the bit.
@@ -260,6 +341,32 @@ mod tests {
         assert_eq!(cloud.reorder(by_data).unwrap().unwrap(), [1, 2, 3, 0, 4]);
         assert_eq!(cloud.reorder(|i, j| i.cmp(&j)).unwrap(), None);
         assert!(!Cloud::sort(&Domain::open(1), Strided::packed(&[0.0, -0.0]), 0.1, &pool).unwrap().shared);
+    }
+
+    #[test]
+    fn empty_space_takes_no_cells() {
+        let pool = Pool::new(1).unwrap();
+        for dim in 1..=3 {
+            for far in [1e4, 1e9, 1e15, 1e300] {
+                let mut x = scattered(500, dim);
+                x.extend([far, -far].map(|far| vec![far; dim]).concat());
+                let n = x.len() / dim;
+                let reach = 0.5 * 500f64.powf(-1.0 / dim as f64);
+                let cloud =
+                    Cloud::sort(&Domain::open(dim), Strided::new("x", &x, n, dim, dim).unwrap(), reach, &pool).unwrap();
+                // Cells as fine as where nothing is far away, and coordinates that never fall.
+                assert!(cloud.grid.edge <= 0.3 * reach, "{dim}-D {far:e} {:e}", cloud.grid.edge);
+                let along: Vec<f64> =
+                    (0..4000).map(|k| -1.1 + 3e-3 * f64::from(k) / 4.0).chain([0.1 * far, far, 2.0 * far]).collect();
+                for axis in 0..dim {
+                    let cells: Vec<u64> = along.iter().map(|&x| cloud.grid.coordinate(axis, x)).collect();
+                    assert!(cells.is_sorted() && cells[4000] > cells[2000], "{dim}-D {far:e}");
+                }
+                let mut keys = cloud.keys.clone();
+                keys.dedup();
+                assert!(keys.len() > 400, "{dim}-D {far:e} {}", keys.len());
+            }
+        }
     }
 
     #[test]

@@ -336,19 +336,24 @@ pub fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
     let bits = super::morton::bits(dim);
     let spacing = |i: usize| {
         // The first level at which the cell around i holds a crowd; cells are runs of equal prefixes.
-        let count = |level: u32| {
+        let run = |level: u32| {
             let shift = level as usize * dim;
             let prefix = keys[i] >> shift;
             let first = keys[..i].partition_point(|k| k >> shift < prefix);
             let last = i + keys[i..].partition_point(|k| k >> shift <= prefix);
-            last - first
+            (first, last)
         };
+        let holds = |level: u32| run(level).1 - run(level).0;
         let (mut low, mut high) = (0, bits);
         while low < high {
             let middle = (low + high) / 2;
-            if count(middle) >= crowd { high = middle } else { low = middle + 1 }
+            if holds(middle) >= crowd { high = middle } else { low = middle + 1 }
         }
-        cloud.grid.edge * 2f64.powi(low as i32) / (count(low) as f64).powf(1.0 / dim as f64)
+        let (first, last) = run(low);
+        // A cell reaches over the space that the grid leaves out.
+        let apart = |j: usize| cloud.x[..dim].iter().map(|x| (x[i] - x[j]).abs()).fold(0.0, f64::max);
+        let edge = (cloud.grid.edge * 2f64.powi(low as i32)).max(apart(first)).max(apart(last - 1));
+        edge / ((last - first) as f64).powf(1.0 / dim as f64)
     };
     let least = extent(cloud) * 1e-12;
     memory::collected("h", (0..cloud.len()).map(|i| (h_fac * spacing(i)).max(least).max(f64::MIN_POSITIVE)))
