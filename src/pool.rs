@@ -5,6 +5,7 @@
 
 use crate::error::{Error, Result};
 use rayon::prelude::*;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 
@@ -25,6 +26,7 @@ pub struct Pool {
     threads: usize,
     workers: Option<rayon::ThreadPool>,
     handles: Handles,
+    cancel: Arc<AtomicBool>,
 }
 
 type Handles = Arc<Mutex<Vec<JoinHandle<()>>>>;
@@ -47,10 +49,12 @@ impl Pool {
         loop {
             let handles = Handles::default();
             if count <= 1 {
-                return Ok(Pool { threads: 1, workers: None, handles });
+                return Ok(Pool { threads: 1, workers: None, handles, cancel: Arc::default() });
             }
             match spawn(count, &handles) {
-                Ok(workers) => return Ok(Pool { threads: count, workers: Some(workers), handles }),
+                Ok(workers) => {
+                    return Ok(Pool { threads: count, workers: Some(workers), handles, cancel: Arc::default() });
+                }
                 Err(e) => {
                     let started = join(&handles);
                     if threads > 0 {
@@ -64,6 +68,29 @@ impl Pool {
 
     pub fn threads(&self) -> usize {
         self.threads
+    }
+
+    /// Lets the same one cancel this pool's work as another's.
+    pub fn obey(&mut self, cancel: Arc<AtomicBool>) {
+        self.cancel = cancel;
+    }
+
+    /// Whoever sets it makes the work that runs here end with `Cancelled`.
+    pub fn canceller(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.cancel)
+    }
+
+    /// Forgets that earlier work was cancelled.
+    pub fn begin(&self) {
+        self.cancel.store(false, Ordering::Relaxed);
+    }
+
+    /// To be asked every few ten milliseconds.
+    ///
+    /// # Errors
+    /// `Cancelled` where somebody wants no more of it.
+    pub fn go_on(&self) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     /// `f(0), f(1), … f(n - 1)` in any order of execution, results in order.

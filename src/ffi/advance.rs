@@ -36,6 +36,8 @@ fn log_step(inside: &mut Inside, r: &Report) -> Result<()> {
     if inside.log.is_none() {
         return Ok(());
     }
+    // The step is done: it is too late to cancel it.
+    inside.solver.begin();
     let plan = inside.solver.plan()?.to_string();
     if plan != inside.logged_plan {
         inside.tell(DIFFUSPH_LOG_INFO, &plan);
@@ -49,8 +51,9 @@ fn log_step(inside: &mut Inside, r: &Report) -> Result<()> {
     Ok(())
 }
 
-/// Makes the step (or rate, or limit) that is running now return CANCELLED, with nothing changed. From any thread, also
-/// from a callback and from a signal handler; the solver must not be destroyed meanwhile. Does nothing if none is running.
+/// Makes the call that is running now return CANCELLED, with nothing changed; one whose work is nearly done may end as it
+/// would have. From any thread, also from a callback and from a signal handler; the solver must not be destroyed meanwhile.
+/// Does nothing if none is running.
 ///
 /// Errors: NULL_POINTER.
 ///

@@ -42,9 +42,11 @@ impl Handle {
         Handle { busy: AtomicBool::new(false), cancel, created_by: std::process::id(), inside: UnsafeCell::new(inside) }
     }
 
-    /// Stops the running step; an atomic store and nothing else, so that signal handlers may do it.
+    /// Stops the running call, if there is one; atomics and nothing else, so that signal handlers may do it.
     pub fn cancel(&self) {
-        self.cancel.store(true, Ordering::Relaxed);
+        if self.busy.load(Ordering::Relaxed) {
+            self.cancel.store(true, Ordering::Relaxed);
+        }
     }
 
     /// Whether this process has the handle's threads.
@@ -57,7 +59,11 @@ impl Handle {
     pub fn enter(&self) -> Result<Entered<'_>> {
         match self.busy.swap(true, Ordering::Acquire) {
             true => Err(Error::Busy),
-            false => Ok(Entered(self)),
+            false => {
+                // What was cancelled was an earlier call.
+                self.cancel.store(false, Ordering::Relaxed);
+                Ok(Entered(self))
+            }
         }
     }
 

@@ -10,7 +10,6 @@ use crate::operator::aggregate::{self, Couplings};
 use crate::operator::{Mean, Multigrid, Pairs};
 use crate::pool::Pool;
 use crate::sum;
-use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A host's function: fills the last slice for time t and temperatures T; the `u32`s are the host's particle numbers.
 /// A code other than 0 stops the step.
@@ -59,7 +58,6 @@ pub struct Heat<'a> {
     /// Skip blocks in which nothing differs.
     pub quiet: bool,
     /// Set by the host from any thread to stop the step.
-    pub cancel: &'a AtomicBool,
     /// What exchange with the outside and a source take from dT/dt per kelvin, 1/s, as last linearised; empty where there
     /// is none.
     pub slopes: Vec<f64>,
@@ -79,9 +77,7 @@ impl Heat<'_> {
     /// # Errors
     /// `Cancelled`; `CallbackFailed` with the host's code; `BadElement` when a callback gives a negative or non-finite kappa.
     pub fn rate(&mut self, time: f64, t: &[f64], rate: &mut [f64]) -> Result<()> {
-        if self.cancel.load(Ordering::Relaxed) {
-            return Err(Error::Cancelled);
-        }
+        self.pool.go_on()?;
         self.applications += 1;
         self.kappa_of_t(time, t)?;
         self.diffuse(t, rate)?;
@@ -164,9 +160,7 @@ impl Heat<'_> {
     /// # Errors
     /// `Cancelled`; `NoMemory`.
     pub fn linear(&mut self, x: &[f64], out: &mut [f64]) -> Result<()> {
-        if self.cancel.load(Ordering::Relaxed) {
-            return Err(Error::Cancelled);
-        }
+        self.pool.go_on()?;
         self.applications += 1;
         self.diffuse(x, out)?;
         let slopes = &self.slopes;

@@ -85,7 +85,7 @@ pub struct Aggregates {
 /// strongest neighbour, where there is room, or what is still free.
 ///
 /// # Errors
-/// `NoMemory`.
+/// `NoMemory`; `Cancelled`.
 pub fn aggregates(
     pool: &Pool,
     graph: &impl Graph,
@@ -101,7 +101,12 @@ pub fn aggregates(
     let mut made = Joining { strongest, of: memory::filled("aggregates", n, NONE)?, sizes: Vec::new() };
     let mut near = Vec::new();
     for enough in [true, false] {
-        (0..n).try_for_each(|i| made.join(graph, i, enough, &mut near))?;
+        for i in 0..n {
+            if i % BLOCK == 0 {
+                pool.go_on()?;
+            }
+            made.join(graph, i, enough, &mut near)?;
+        }
     }
     Ok(Aggregates { of: made.of, count: made.sizes.len() })
 }

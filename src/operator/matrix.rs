@@ -271,6 +271,7 @@ impl Matrix {
     pub fn symmetrise(&mut self, apart: Option<&[Vec<[f32; 3]>]>, pool: &Pool) -> Result<()> {
         let between = |i: usize, at: usize| apart.map_or([0.0; 3], |apart| apart[i / BLOCK][at]);
         let made = pool.map(self.blocks.len(), |b| {
+            pool.go_on()?;
             let block = &self.blocks[b];
             let mut coef = memory::copied("matrix coefficients", &block.coef)?;
             for k in 0..block.len() {

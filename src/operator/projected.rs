@@ -260,6 +260,7 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
         x.fill(Vector::zeros());
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {
+            self.pool.go_on()?;
             self.each(&mut z, |i, z| *z = inverse[i] * r[i]);
             let rz = dot(r, &z);
             self.each(&mut p, |i, p| *p = z[i] + *p * (rz / before));

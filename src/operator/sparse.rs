@@ -102,7 +102,7 @@ impl Sparse {
     /// The matrix whose row i is what `row` adds for it.
     ///
     /// # Errors
-    /// `NoMemory`.
+    /// `NoMemory`; `Cancelled`.
     pub fn gather(
         pool: &Pool,
         rows: usize,
@@ -110,6 +110,7 @@ impl Sparse {
         row: impl Fn(usize, &mut Gather) + Sync + Send,
     ) -> Result<Sparse> {
         let blocks = pool.map_init(rows.div_ceil(BLOCK), Gather::default, |gather, b| {
+            pool.go_on()?;
             gather.begin(columns)?;
             for i in b * BLOCK..((b + 1) * BLOCK).min(rows) {
                 row(i, gather);

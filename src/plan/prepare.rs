@@ -551,7 +551,6 @@ impl State {
             volume: &g.volume,
             host: &cloud.host,
             quiet: plan.leaves_out(&rules::QUIET_ROWS),
-            cancel: &self.cancel,
             slopes: Vec::new(),
             parts: &mut self.parts,
             multigrid: Some(&mut self.multigrid),

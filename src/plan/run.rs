@@ -12,7 +12,6 @@ use crate::model::fields::{self, Slot};
 use crate::model::heat;
 use crate::operator::table::Tensor;
 use crate::sum;
-use std::sync::atomic::Ordering;
 use std::time::Instant;
 
 /// How far, relative to the largest |T|, rounding may carry a value over a bound that the method keeps.
@@ -52,7 +51,6 @@ impl State {
         if !(dt >= 0.0 && dt.is_finite()) {
             return Err(Error::bad("dt", dt, "a step must be finite and not negative"));
         }
-        self.cancel.store(false, Ordering::Relaxed);
         let start = Instant::now();
         self.set_anew()?;
         let mut plan = self.prepare("step")?;
@@ -97,7 +95,6 @@ impl State {
     /// # Errors
     /// Any error of [`State::prepare`]; `CallbackFailed`.
     pub fn rate(&mut self) -> Result<Vec<f64>> {
-        self.cancel.store(false, Ordering::Relaxed);
         self.set_anew()?;
         // It counts for the plan, and only if it succeeds for what comes after.
         let before = self.rates;
@@ -130,7 +127,6 @@ impl State {
 
     /// Bounds on the operator now, refined by power iteration.
     pub fn bounds(&mut self) -> Result<Bounds> {
-        self.cancel.store(false, Ordering::Relaxed);
         let plan = self.prepare("limit")?;
         let (t, time) = (self.each(fields::T)?, self.time);
         self.with_motion(&plan, |motion| motion.refined_bounds(time, &t))

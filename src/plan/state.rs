@@ -20,8 +20,6 @@ use crate::operator::{Matrix, Mean, Multigrid, Normalise, Sym, Twice};
 use crate::pool::Pool;
 use crate::space::{Cloud, Domain, facing};
 use crate::sum;
-use std::sync::Arc;
-use std::sync::atomic::AtomicBool;
 
 /// What follows from positions, masses, densities and smoothing lengths; internal order.
 pub struct Geometry {
@@ -87,7 +85,6 @@ pub struct State {
     pub kappa_host: Option<Callback>,
     pub source_host: Option<Callback>,
     pub progress: Option<Progress>,
-    pub cancel: Arc<AtomicBool>,
 
     /// Made from the inputs of a tensor, where there are any.
     pub directions: Option<Directions>,
@@ -139,7 +136,6 @@ impl State {
             kappa_host: None,
             source_host: None,
             progress: None,
-            cancel: Arc::default(),
             directions: None,
             geometry: None,
             last_h: Vec::new(),

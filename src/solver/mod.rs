@@ -238,9 +238,9 @@ impl Solver {
         self.state.progress = callback;
     }
 
-    /// Setting it from any thread makes the running step stop with `Cancelled`.
+    /// Setting it from any thread makes the running call stop with `Cancelled`.
     pub fn canceller(&self) -> Arc<AtomicBool> {
-        Arc::clone(&self.state.cancel)
+        self.state.pool.canceller()
     }
 
     /// Advances by exactly `dt`, in as many sub-steps as the method needs.
@@ -248,6 +248,7 @@ impl Solver {
     /// # Errors
     /// See [`State::step`]; whatever goes wrong, T and time are as they were.
     pub fn step(&mut self, dt: f64) -> Result<Report> {
+        self.begin();
         self.state.step(dt)
     }
 
@@ -261,11 +262,13 @@ impl Solver {
 
     /// The largest stable explicit Euler step now, s; infinite where nothing diffuses.
     pub fn limit(&mut self) -> Result<f64> {
+        self.begin();
         self.state.limit()
     }
 
     /// What a step will do, and what it leaves out and why.
     pub fn plan(&mut self) -> Result<Plan> {
+        self.begin();
         self.state.plan()
     }
 

@@ -16,7 +16,12 @@ impl Solver {
     ///
     /// # Errors
     /// `UnknownWord`, `WrongCount`, `OutOfOrder`; nothing is written then.
-    pub fn get(&mut self, name: &str, mut out: StridedMut) -> Result<()> {
+    pub fn get(&mut self, name: &str, out: StridedMut) -> Result<()> {
+        self.begin();
+        self.fetch(name, out)
+    }
+
+    fn fetch(&mut self, name: &str, mut out: StridedMut) -> Result<()> {
         let field = fields::field(name)?;
         let components = if field.vector { self.dim() } else { 1 };
         self.state.cloud("get")?;
@@ -36,10 +41,16 @@ impl Solver {
     /// # Errors
     /// As [`Solver::get`].
     pub fn get_all(&mut self, name: &str) -> Result<Vec<f64>> {
+        self.begin();
+        self.fetch_all(name)
+    }
+
+    /// As [`Solver::get_all`], within a call that may have been cancelled.
+    pub(super) fn fetch_all(&mut self, name: &str) -> Result<Vec<f64>> {
         let components = if fields::field(name)?.vector { self.dim() } else { 1 };
         let n = self.len();
         let mut out = memory::filled(name, n * components, 0.0)?;
-        self.get(name, StridedMut::new(name, &mut out, n, components, components)?)?;
+        self.fetch(name, StridedMut::new(name, &mut out, n, components, components)?)?;
         Ok(out)
     }
 
@@ -49,6 +60,7 @@ impl Solver {
     /// `UnknownWord`, `OutOfOrder`.
     pub fn get_number(&mut self, name: &str) -> Result<f64> {
         let number = fields::number(name)?;
+        self.begin();
         let state = &mut self.state;
         let temperatures = |state: &State| -> Result<Vec<f64>> {
             state.cloud("get_number")?;

@@ -8,7 +8,6 @@ use crate::model::fields::{self, FIELDS, INPUTS};
 use crate::plan::given::{Offer, Offered};
 use crate::plan::state::{Input, State};
 use crate::space::Domain;
-use std::sync::atomic::Ordering;
 use std::time::{Duration, Instant};
 
 /// What other words made of the particles.
@@ -29,20 +28,19 @@ impl Solver {
     pub fn attempt(&mut self, words: &str, dt: f64, patience: Duration) -> Result<Option<Trial>> {
         let mut other = Solver::new(words)?;
         super::expect("dim", other.dim(), self.dim(), "a trial has the dimensions of its particles")?;
-        let (n, dim, x) = (self.len(), self.dim(), self.get_all("x")?);
+        let (n, dim, x) = (self.len(), self.dim(), self.fetch_all("x")?);
         let inputs = self.inputs_by_host()?;
         let start = Instant::now();
         self.hand_over(&mut other.state, Strided::new("x", &x, n, dim, dim)?, inputs)?;
-        let cancel = self.canceller();
-        let given_up = move || cancel.load(Ordering::Relaxed) || start.elapsed() > patience;
-        other.set_progress_callback(Some(Box::new(move |_, _| i32::from(given_up()))));
+        other.state.pool.obey(self.canceller());
+        other.set_progress_callback(Some(Box::new(move |_, _| i32::from(start.elapsed() > patience))));
         self.lend(&mut other.state);
-        let done = other.step(dt);
+        let done = other.state.step(dt);
         self.lend(&mut other.state);
         let seconds = start.elapsed().as_secs_f64();
         match done {
-            Ok(_) => Ok(Some(Trial { t: other.get_all("T")?, seconds })),
-            Err(Error::Cancelled) if !self.state.cancel.load(Ordering::Relaxed) => Ok(None),
+            Ok(_) => Ok(Some(Trial { t: other.fetch_all("T")?, seconds })),
+            Err(Error::Cancelled) if self.state.pool.go_on().is_ok() => Ok(None),
             Err(e) => Err(e),
         }
     }
@@ -54,12 +52,12 @@ impl Solver {
     pub fn tell(&mut self, share: f64) -> Result<()> {
         let time = self.state.time;
         let refused = self.state.progress.as_mut().is_some_and(|progress| progress(time, share) != 0);
-        if refused || self.state.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+        if refused { Err(Error::Cancelled) } else { self.state.pool.go_on() }
     }
 
     /// Forgets that an earlier call was cancelled.
     pub fn begin(&mut self) {
-        self.state.cancel.store(false, Ordering::Relaxed);
+        self.state.pool.begin();
     }
 
     /// The box, or open space.

@@ -1,6 +1,6 @@
 //! The particles' positions in internal order, and the way back to the host's order.
 
-use super::{Axes, Domain, morton};
+use super::{Axes, Domain, LENGTHS, LENGTHS_RULE, morton};
 use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -147,14 +147,20 @@ impl Cloud {
     /// a search will ask for; 0 where it is not known yet.
     ///
     /// # Errors
-    /// `BadElement` for a coordinate that is not finite, `BadValue` for more than 2³² − 1 particles, `NoMemory`.
+    /// `BadElement` for a coordinate that is not finite; `BadValue` for more than 2³² − 1 particles, or where they fill no
+    /// length of [`LENGTHS`]; `NoMemory`.
     pub fn sort(domain: &Domain, x: Strided, reach: f64, pool: &Pool) -> Result<Cloud> {
         if x.len() >= u32::MAX as usize {
             return Err(Error::bad("n", x.len(), "at most 2^32 - 2 particles per solver"));
         }
         x.check("x", "coordinates must be finite", f64::is_finite)?;
         let reach = rounded(reach);
-        let grid = Grid::new(domain, bounds(domain, x), reach, |axis| {
+        let (lo, hi) = bounds(domain, x);
+        let widest = (0..domain.dim).map(|a| hi[a] - lo[a]).fold(0.0, f64::max);
+        if widest > 0.0 && !LENGTHS.contains(&widest) {
+            return Err(Error::bad("x", format!("spread over {widest:e}"), LENGTHS_RULE));
+        }
+        let grid = Grid::new(domain, (lo, hi), reach, |axis| {
             let wrapped = (0..x.len()).map(|i| domain.wrap(axis, x.at(i, axis)));
             let mut sorted = memory::collected("coordinates", wrapped)?;
             sorted.sort_unstable_by(f64::total_cmp);
@@ -180,9 +186,11 @@ impl Cloud {
                 by_axis.unwrap_or(a.1.cmp(&b.1))
             })
         };
+        pool.go_on()?;
         if pool.install(|| order.par_sort_unstable_by(compare)).is_none() {
             order.sort_unstable_by(compare);
         }
+        pool.go_on()?;
         let host = memory::collected("order", order.iter().map(|item| item.1))?;
         let keys = memory::collected("keys", order.iter().map(|item| item.0))?;
         let mut axes = [const { Vec::new() }; 3];
@@ -347,7 +355,7 @@ mod tests {
     fn empty_space_takes_no_cells() {
         let pool = Pool::new(1).unwrap();
         for dim in 1..=3 {
-            for far in [1e4, 1e9, 1e15, 1e300] {
+            for far in [1e4, 1e9, 1e15, 4e99] {
                 let mut x = scattered(500, dim);
                 x.extend([far, -far].map(|far| vec![far; dim]).concat());
                 let n = x.len() / dim;

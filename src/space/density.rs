@@ -18,7 +18,7 @@
 //! at right angles, so that edges and corners have it too.
 
 use super::facing::{Face, Faces};
-use super::{Cloud, ONE_SIDED, Row, Scratch, rows::Rows};
+use super::{Cloud, LENGTHS, ONE_SIDED, Row, Scratch, rows::Rows};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::memory;
@@ -356,7 +356,7 @@ pub fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
         edge / ((last - first) as f64).powf(1.0 / dim as f64)
     };
     let least = extent(cloud) * 1e-12;
-    memory::collected("h", (0..cloud.len()).map(|i| (h_fac * spacing(i)).max(least).max(f64::MIN_POSITIVE)))
+    memory::collected("h", (0..cloud.len()).map(|i| (h_fac * spacing(i)).max(least).max(*LENGTHS.start())))
 }
 
 fn extent(cloud: &Cloud) -> f64 {

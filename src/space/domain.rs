@@ -7,6 +7,11 @@ use crate::error::{Error, Result};
 /// times: the resolution is wrong, not the search.
 pub const MAX_IMAGES: usize = 6;
 
+/// Lengths whose squares and volumes, and what is divided by them, are numbers.
+pub const LENGTHS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
+pub const LENGTHS_RULE: &str =
+    "lengths must lie between 1e-100 and 1e100, so that volumes are numbers: choose other units";
+
 #[derive(Debug, Clone, PartialEq)]
 pub struct Domain {
     pub dim: usize,
@@ -24,7 +29,7 @@ impl Domain {
     /// A box that is periodic on some axes; on the others its bounds only have to be numbers.
     ///
     /// # Errors
-    /// `BadElement` for bounds that are not finite or a periodic axis without length.
+    /// `BadElement` for bounds that are not finite or a periodic axis whose length is none or not among [`LENGTHS`].
     pub fn new(lo: &[f64], hi: &[f64], periodic: &[bool]) -> Result<Domain> {
         let mut domain = Domain::open(lo.len());
         for axis in 0..lo.len() {
@@ -35,6 +40,9 @@ impl Domain {
             }
             if periodic[axis] && (hi[axis] <= lo[axis] || !(hi[axis] - lo[axis]).is_finite()) {
                 return Err(Error::bad_at("hi", axis, hi[axis], "a periodic box needs hi > lo"));
+            }
+            if periodic[axis] && !LENGTHS.contains(&(hi[axis] - lo[axis])) {
+                return Err(Error::bad_at("hi", axis, hi[axis], LENGTHS_RULE));
             }
             (domain.lo[axis], domain.hi[axis], domain.periodic[axis]) = (lo[axis], hi[axis], periodic[axis]);
         }
@@ -64,8 +72,11 @@ impl Domain {
         image(from)..=image(to)
     }
 
-    /// Refuses a support so large that it reaches more than [`MAX_IMAGES`] images.
+    /// Refuses a support that is not among [`LENGTHS`] or so large that it reaches more than [`MAX_IMAGES`] images.
     pub fn check_reach(&self, reach: f64, index: usize) -> Result<()> {
+        if !LENGTHS.contains(&reach) {
+            return Err(Error::bad_at("h", index, format!("of a support of {reach:e}"), LENGTHS_RULE));
+        }
         for axis in (0..self.dim).filter(|&a| self.periodic[a]) {
             let length = self.length(axis);
             if reach > length * MAX_IMAGES as f64 {
@@ -96,6 +107,15 @@ mod tests {
         let d = Domain::new(&[0.0], &[1.0], &[true]).unwrap();
         assert_eq!(d.images(0, -0.2, 0.3), -1..=0);
         assert_eq!(d.images(0, -1.2, 2.3), -2..=2);
+        for reach in [1e-101, 1e101, f64::INFINITY, f64::NAN] {
+            let text = Domain::open(1).check_reach(reach, 7).unwrap_err().to_string();
+            assert!(text.contains("h[7]") && text.contains("1e100"), "{text}");
+        }
+        for length in [1e-101, 1e101, 1.7e308] {
+            assert!(
+                Domain::new(&[0.0], &[length], &[true]).is_err() && Domain::new(&[0.0], &[length], &[false]).is_ok()
+            );
+        }
         assert!(d.check_reach(100.0, 7).unwrap_err().to_string().contains("particle 7"));
         assert!(Domain::new(&[0.0], &[0.0], &[true]).is_err() && Domain::new(&[f64::NAN], &[0.0], &[false]).is_err());
     }

@@ -14,7 +14,7 @@ pub mod rows;
 mod scratch;
 
 pub use cloud::Cloud;
-pub use domain::Domain;
+pub use domain::{Domain, LENGTHS, LENGTHS_RULE};
 pub use nearest::Nearest;
 pub use scratch::{ONE_SIDED, Row, Scratch};
 

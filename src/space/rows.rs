@@ -6,9 +6,11 @@
 
 use super::cells::Cells;
 use super::{Axes, Cloud, Nearest, Row, Scratch};
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::pool::{BLOCK, Pool};
 use std::ops::Range;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// A neighbour search over a cloud: cells plus the smoothing lengths they were made for.
 pub struct Rows<'a> {
@@ -16,6 +18,7 @@ pub struct Rows<'a> {
     pub h: &'a [f64],
     pub radius: f64,
     cells: Cells,
+    cancel: Arc<AtomicBool>,
 }
 
 impl<'a> Rows<'a> {
@@ -25,10 +28,12 @@ impl<'a> Rows<'a> {
     /// `BoxTooSmall` where a support reaches too many images of a periodic box; `NoMemory`.
     pub fn new(cloud: &'a Cloud, h: &'a [f64], radius: f64, pool: &Pool) -> Result<Rows<'a>> {
         let cells = Cells::new(cloud, h, radius, pool)?;
-        if let Some(largest) = h.iter().position(|&hi| hi == cells.h_max) {
-            cloud.domain.check_reach(radius * cells.h_max, cloud.host[largest] as usize)?;
+        let extremes = [cells.h_max, h.iter().copied().fold(f64::INFINITY, f64::min)];
+        for (i, h) in extremes.into_iter().filter_map(|extreme| Some((h.iter().position(|&h| h == extreme)?, extreme)))
+        {
+            cloud.domain.check_reach(radius * h, cloud.host[i] as usize)?;
         }
-        Ok(Rows { cloud, h, radius, cells })
+        Ok(Rows { cloud, h, radius, cells, cancel: pool.canceller() })
     }
 
     /// The way from a particle to its neighbours without a search; none where one may be a neighbour with two images.
@@ -47,6 +52,9 @@ impl<'a> Rows<'a> {
     }
 
     /// Calls `visit` with the row of every particle in `range`, in order.
+    ///
+    /// # Errors
+    /// `NoMemory`; `Cancelled`.
     pub fn visit(&self, range: Range<usize>, scratch: &mut Scratch, visit: impl FnMut(Row)) -> Result<()> {
         self.visit_where(range, scratch, |_| true, visit)
     }
@@ -59,6 +67,9 @@ impl<'a> Rows<'a> {
         wanted: impl Fn(usize) -> bool,
         visit: impl FnMut(Row),
     ) -> Result<()> {
+        if self.cancel.load(Ordering::Relaxed) {
+            return Err(Error::Cancelled);
+        }
         match self.cloud.dim() {
             1 => self.visit_in::<1>(range, scratch, wanted, visit),
             2 => self.visit_in::<2>(range, scratch, wanted, visit),

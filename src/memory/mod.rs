@@ -1,7 +1,17 @@
 //! Arrays whose size a host decides: reserved fallibly, because an abort on a failed allocation would take the host
 //! with it.
 
+mod limits;
+mod reserve;
+
 use crate::error::{Error, Result};
+pub use limits::available;
+use reserve::{is_low, refusable};
+use std::collections::TryReserveError;
+
+#[cfg(not(feature = "host-allocator"))]
+#[global_allocator]
+static ALLOCATOR: reserve::Allocator = reserve::Allocator;
 
 /// An array of `n` copies of `value`, or `NoMemory`.
 pub fn filled<T: Clone>(what: &str, n: usize, value: T) -> Result<Vec<T>> {
@@ -27,7 +37,7 @@ pub fn collected<T>(what: &str, items: impl ExactSizeIterator<Item = T>) -> Resu
 /// Makes an array at least `n` long with copies of `value`, or `NoMemory`.
 pub fn extended<T: Clone>(what: &str, v: &mut Vec<T>, n: usize, value: T) -> Result<()> {
     if n > v.len() {
-        v.try_reserve(n - v.len()).map_err(|_| no_memory::<T>(what, n))?;
+        granted(what, n, v, |v| v.try_reserve(n - v.len()))?;
         v.resize(n, value);
     }
     Ok(())
@@ -35,7 +45,9 @@ pub fn extended<T: Clone>(what: &str, v: &mut Vec<T>, n: usize, value: T) -> Res
 
 /// Appends an item, or `NoMemory`.
 pub fn pushed<T>(what: &str, v: &mut Vec<T>, item: T) -> Result<()> {
-    v.try_reserve(1).map_err(|_| no_memory::<T>(what, v.len() + 1))?;
+    if v.len() == v.capacity() {
+        granted(what, v.len() + 1, v, |v| v.try_reserve(1))?;
+    }
     v.push(item);
     Ok(())
 }
@@ -43,32 +55,24 @@ pub fn pushed<T>(what: &str, v: &mut Vec<T>, item: T) -> Result<()> {
 /// An empty array with room for exactly `n`, or `NoMemory`.
 pub fn reserved<T>(what: &str, n: usize) -> Result<Vec<T>> {
     let mut v = Vec::new();
-    match v.try_reserve_exact(n) {
-        Ok(()) => Ok(v),
-        Err(_) => Err(no_memory::<T>(what, n)),
-    }
+    granted(what, n, &mut v, |v| v.try_reserve_exact(n))?;
+    Ok(v)
+}
+
+/// Makes room for `n` items in all, or `NoMemory`: the system has none, or only the reserve is left.
+fn granted<T>(
+    what: &str,
+    n: usize,
+    v: &mut Vec<T>,
+    ask: impl FnOnce(&mut Vec<T>) -> std::result::Result<(), TryReserveError>,
+) -> Result<()> {
+    if is_low() || refusable(|| ask(v)).is_err() { Err(no_memory::<T>(what, n)) } else { Ok(()) }
 }
 
 /// The error for an array of `n` items that did not fit.
 pub fn no_memory<T>(what: &str, n: usize) -> Error {
     let bytes = (n as u64).saturating_mul(size_of::<T>() as u64);
     Error::NoMemory { what: what.into(), bytes, available: available() }
-}
-
-/// Bytes of physical memory that this process may still take without pushing others out: Linux' own estimate where it
-/// gives one, all of the machine's memory elsewhere.
-pub fn available() -> u64 {
-    let estimate = std::fs::read_to_string("/proc/meminfo").ok().and_then(|text| {
-        let line = text.lines().find(|l| l.starts_with("MemAvailable:"))?;
-        line.split_whitespace().nth(1)?.parse::<u64>().ok().map(|kib| kib * 1024)
-    });
-    estimate.unwrap_or_else(physical)
-}
-
-fn physical() -> u64 {
-    // SAFETY: sysconf has no preconditions; it answers -1 for what it does not know.
-    let (pages, size) = unsafe { (libc::sysconf(libc::_SC_PHYS_PAGES), libc::sysconf(libc::_SC_PAGESIZE)) };
-    if pages > 0 && size > 0 { pages as u64 * size as u64 } else { u64::MAX }
 }
 
 /// Bytes held by an array.
@@ -85,10 +89,5 @@ mod tests {
         let e = filled("weights", usize::MAX / 16, 0.0f64).unwrap_err();
         assert_eq!(e.code(), -9);
         assert!(e.to_string().contains("weights"), "{e}");
-    }
-
-    #[test]
-    fn available_memory_is_known_here() {
-        assert!(available() > 1 << 20);
     }
 }
