@@ -37,7 +37,7 @@ pub fn collected<T>(what: &str, items: impl ExactSizeIterator<Item = T>) -> Resu
 /// Makes an array at least `n` long with copies of `value`, or `NoMemory`.
 pub fn extended<T: Clone>(what: &str, v: &mut Vec<T>, n: usize, value: T) -> Result<()> {
     if n > v.len() {
-        granted(what, n, v, |v| v.try_reserve(n - v.len()))?;
+        room(what, v, n - v.len())?;
         v.resize(n, value);
     }
     Ok(())
@@ -45,28 +45,40 @@ pub fn extended<T: Clone>(what: &str, v: &mut Vec<T>, n: usize, value: T) -> Res
 
 /// Appends an item, or `NoMemory`.
 pub fn pushed<T>(what: &str, v: &mut Vec<T>, item: T) -> Result<()> {
-    if v.len() == v.capacity() {
-        granted(what, v.len() + 1, v, |v| v.try_reserve(1))?;
-    }
+    room(what, v, 1)?;
     v.push(item);
     Ok(())
+}
+
+/// Appends copies of a slice, or `NoMemory`.
+pub fn appended<T: Copy>(what: &str, v: &mut Vec<T>, from: &[T]) -> Result<()> {
+    room(what, v, from.len())?;
+    v.extend_from_slice(from);
+    Ok(())
+}
+
+/// Makes room for `more` items behind those that are there, or `NoMemory`.
+pub fn room<T>(what: &str, v: &mut Vec<T>, more: usize) -> Result<()> {
+    if v.capacity() - v.len() >= more {
+        return Ok(());
+    }
+    granted::<T>(what, v.len() + more, || v.try_reserve(more))
 }
 
 /// An empty array with room for exactly `n`, or `NoMemory`.
 pub fn reserved<T>(what: &str, n: usize) -> Result<Vec<T>> {
     let mut v = Vec::new();
-    granted(what, n, &mut v, |v| v.try_reserve_exact(n))?;
+    granted::<T>(what, n, || v.try_reserve_exact(n))?;
     Ok(v)
 }
 
-/// Makes room for `n` items in all, or `NoMemory`: the system has none, or only the reserve is left.
-fn granted<T>(
+/// Asks for room for `n` items; `NoMemory` where the system has none, or only the reserve is left.
+pub fn granted<T>(
     what: &str,
     n: usize,
-    v: &mut Vec<T>,
-    ask: impl FnOnce(&mut Vec<T>) -> std::result::Result<(), TryReserveError>,
+    ask: impl FnOnce() -> std::result::Result<(), TryReserveError>,
 ) -> Result<()> {
-    if is_low() || refusable(|| ask(v)).is_err() { Err(no_memory::<T>(what, n)) } else { Ok(()) }
+    if is_low() || refusable(ask).is_err() { Err(no_memory::<T>(what, n)) } else { Ok(()) }
 }
 
 /// The error for an array of `n` items that did not fit.

@@ -139,8 +139,7 @@ impl Joining {
             near.truncate(size - 1);
         }
         let new = self.sizes.len() as u32;
-        self.sizes.try_reserve(1).map_err(|_| memory::no_memory::<u32>("aggregates", self.sizes.len()))?;
-        self.sizes.push(1 + near.len() as u32);
+        memory::pushed("aggregates", &mut self.sizes, 1 + near.len() as u32)?;
         self.of[i] = new;
         near.iter().for_each(|&(_, j)| self.of[j as usize] = new);
         Ok(())
@@ -156,8 +155,7 @@ impl Joining {
             let strong = self.strongest[j] > 0.0 && c >= STRONG * self.strongest[i].max(self.strongest[j]);
             match self.of[j] {
                 _ if !strong => {}
-                NONE if near.try_reserve(1).is_ok() => near.push((c, j as u32)),
-                NONE => room = false,
+                NONE => room &= memory::pushed("aggregates", near, (c, j as u32)).is_ok(),
                 taken if c > best => (best, host) = (c, taken),
                 _ => {}
             }

@@ -15,8 +15,8 @@ pub fn of<const D: usize>(rows: &Rows, unit: f64, pool: &Pool) -> Result<Vec<Vec
     let blocks = pool.map_init(n.div_ceil(BLOCK), Scratch::default, |scratch, b| {
         let (mut block, mut room) = (Vec::new(), Ok(()));
         rows.visit(b * BLOCK..((b + 1) * BLOCK).min(n), scratch, |row| {
-            if block.try_reserve(row.len()).is_err() {
-                return room = Err(memory::no_memory::<[f32; D]>("pairs", row.len()));
+            if let Err(e) = memory::room("pairs", &mut block, row.len()) {
+                return room = Err(e);
             }
             block.extend(
                 (0..row.len()).map(|k| std::array::from_fn(|a| row.d[a].get(k).map_or(0.0, |d| (d / unit) as f32))),

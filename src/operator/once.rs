@@ -251,9 +251,9 @@ impl Assembly<'_> {
         let dim = self.kernel.dim() as f64;
         start.push(0);
         self.rows.visit(range, scratch, |row| {
-            let w = match self.weights(&row, buffers) {
-                Ok(w) if col.try_reserve(row.len()).is_ok() && coef.try_reserve(row.len()).is_ok() => w,
-                Ok(_) => return failed = Err(memory::no_memory::<(u32, f64)>("matrix", row.len())),
+            let room = memory::room("matrix", &mut col, row.len()).and(memory::room("matrix", &mut coef, row.len()));
+            let w = match room.and_then(|()| self.weights(&row, buffers)) {
+                Ok(w) => w,
                 Err(e) => return failed = Err(e),
             };
             let from = col.len();

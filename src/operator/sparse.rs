@@ -53,7 +53,7 @@ impl Gather {
         self.start.clear();
         self.col.clear();
         self.coef.clear();
-        self.start.try_reserve(BLOCK + 1).map_err(|_| memory::no_memory::<u32>("rows", BLOCK))?;
+        memory::room("rows", &mut self.start, BLOCK + 1)?;
         self.start.push(0);
         Ok(())
     }
@@ -71,11 +71,8 @@ impl Gather {
     #[inline]
     fn push(&mut self, column: u32, value: f64) {
         let at = self.col.len();
-        let room = at < self.col.capacity() && at < self.coef.capacity();
-        if !room && (self.col.try_reserve(1).is_err() || self.coef.try_reserve(1).is_err()) {
-            return self.full = true;
-        }
-        if at >= u32::MAX as usize / 2 {
+        let room = memory::room("", &mut self.col, 1).and(memory::room("", &mut self.coef, 1));
+        if room.is_err() || at >= u32::MAX as usize / 2 {
             return self.full = true;
         }
         self.place[column as usize] = self.base + at as u32;

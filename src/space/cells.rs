@@ -72,7 +72,7 @@ fn by_level(h: &[f64], h_max: f64) -> Result<Vec<Vec<u32>>> {
         let list = &mut members[level];
         if list.len() == list.capacity() {
             let more = list.len().max(64).min(h.len() - i);
-            list.try_reserve_exact(more).map_err(|_| memory::no_memory::<u32>("cell lists", more))?;
+            memory::granted::<u32>("cell lists", more, || list.try_reserve_exact(more))?;
         }
         list.push(i as u32);
     }
@@ -100,18 +100,13 @@ impl Level {
         for (at, &i) in members.iter().enumerate() {
             let key = cell_key(cloud, i as usize, shift);
             if keys.last() != Some(&key) {
-                if keys.len() == keys.capacity() {
-                    let more = keys.len().max(64);
-                    keys.try_reserve(more).map_err(|_| memory::no_memory::<u64>("cell keys", more))?;
-                    starts.try_reserve(more).map_err(|_| memory::no_memory::<u32>("cell starts", more))?;
-                }
-                keys.push(key);
-                starts.push(at as u32);
+                memory::pushed("cell keys", &mut keys, key)?;
+                memory::pushed("cell starts", &mut starts, at as u32)?;
             }
         }
-        starts.push(members.len() as u32);
+        memory::pushed("cell starts", &mut starts, members.len() as u32)?;
         let mut index = HashMap::default();
-        index.try_reserve(keys.len()).map_err(|_| memory::no_memory::<(u64, u32)>("cell table", keys.len()))?;
+        memory::granted::<(u64, u32)>("cell table", keys.len(), || index.try_reserve(keys.len()))?;
         index.extend(keys.iter().enumerate().map(|(at, &key)| (key, at as u32)));
         Ok(Level { h_max, members, shift, keys, starts, index })
     }

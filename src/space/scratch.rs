@@ -50,6 +50,8 @@ pub const ONE_SIDED: [f64; 3] = [0.6, 0.3, 0.25];
 /// Candidates sifted together.
 const LANES: usize = 8;
 
+const CANDIDATES: &str = "neighbour candidates";
+
 /// What single precision may be wrong by in a distance between two places in the search box, in lengths of the box, with
 /// room to spare: coordinates and their differences are rounded by 2^-25 at most, squares and their sum by 2^-23.
 const SLACK: f64 = 1e-6;
@@ -326,7 +328,7 @@ impl Scratch {
     pub fn add_zero_shifts(&mut self) -> Result<()> {
         let n = self.j.len();
         for shift in &mut self.shift {
-            shift.try_reserve(n).map_err(|_| memory::no_memory::<f64>("neighbour candidates", n))?;
+            memory::room(CANDIDATES, shift, n)?;
             shift.resize(n, 0.0);
         }
         Ok(())
@@ -341,24 +343,22 @@ impl Scratch {
         shift: Option<Axes<f64>>,
         lengths: Option<(&[f64], f64)>,
     ) -> Result<()> {
-        let failed = |_| memory::no_memory::<f64>("neighbour candidates", cell.len());
-        self.j.try_reserve(cell.len()).map_err(failed)?;
-        self.j.extend_from_slice(cell);
+        memory::appended(CANDIDATES, &mut self.j, cell)?;
         // Where all particles are on one level, those of a cell are one after the other.
         let run = cell.first().zip(cell.last()).map(|(&first, &last)| first as usize..last as usize + 1);
         for (a, x) in self.x.iter_mut().enumerate().take(cloud.dim()) {
-            x.try_reserve(cell.len()).map_err(failed)?;
+            memory::room(CANDIDATES, x, cell.len())?;
             match &run {
                 Some(run) if run.len() == cell.len() => x.extend_from_slice(&cloud.x[a][run.clone()]),
                 _ => x.extend(cell.iter().map(|&j| cloud.x[a][j as usize])),
             }
         }
         for (all, by) in self.shift.iter_mut().zip(shift.iter().flatten()) {
-            all.try_reserve(cell.len()).map_err(failed)?;
+            memory::room(CANDIDATES, all, cell.len())?;
             all.resize(all.len() + cell.len(), *by);
         }
         if let Some((h, radius)) = lengths {
-            self.reach.try_reserve(cell.len()).map_err(failed)?;
+            memory::room(CANDIDATES, &mut self.reach, cell.len())?;
             self.reach.extend(cell.iter().map(|&j| radius * h[j as usize]));
         }
         Ok(())
@@ -377,7 +377,7 @@ impl Scratch {
         }
         (self.origin, self.scale) = (from, 1.0 / size);
         self.slack = SLACK + 8.0 * f64::EPSILON * magnitude * self.scale;
-        let (what, n) = ("neighbour candidates", self.j.len());
+        let (what, n) = (CANDIDATES, self.j.len());
         let padded = n.next_multiple_of(LANES);
         for (a, origin) in from.into_iter().enumerate().take(domain.dim) {
             let (shift, sieve, scale) = (&self.shift[a], &mut self.sieve[a], self.scale);

@@ -275,8 +275,8 @@ fn block(assembly: &Assembly, recipe: &Recipe, scratch: &mut Scratch, b: usize) 
     let mut failed = Ok(());
     start.push(0);
     assembly.rows.visit(range, scratch, |row| {
-        if slopes.try_reserve(row.len()).is_err() {
-            return failed = Err(memory::no_memory::<Slope>("slopes", row.len()));
+        if let Err(e) = memory::room("slopes", &mut slopes, row.len()) {
+            return failed = Err(e);
         }
         let h = assembly.rows.h;
         fill(assembly, &row, |_| h[row.i], &mut q, &mut own);
