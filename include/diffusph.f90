@@ -1,18 +1,21 @@
-! diffusph: diffusion on SPH particles. The Fortran interface, for Fortran 2018 and later.
+! diffusph: diffusion on SPH particles. The Fortran interface, for Fortran 2003 and later.
 !
 ! Compile this file with your own compiler and link with libdiffusph. Every function of the C interface is here under its
 ! own name, with the same arguments; diffusph.h documents them. In Fortran:
 !
 ! - Each function answers a status: DIFFUSPH_DONE (0), > 0 (nothing changed, ask for less), < 0 (the call was wrong).
 ! - A solver is a type(c_ptr).
-! - Texts are handed over as diffusph_c('kappa'), and come back through diffusph_text(buffer).
+! - Texts are handed over as diffusph_c('kappa'), and come back through diffusph_text(buffer), the buffer being a
+!   character(len=256) or an array of characters.
 ! - Arrays of any shape are passed as they are: x(3, n) with stride 3, xyzh(4, n) with stride 4, xyzh(4, 1) with stride 4
 !   for the last row. Arguments that may be NULL in C are optional. Particles are numbered from 0.
 ! - A callback is passed as c_funloc(my_function), c_null_funptr takes it away; it has the abstract interface below.
 module diffusph
-    use, intrinsic :: iso_c_binding, only: c_char, c_double, c_funptr, c_int32_t, c_int64_t, c_null_char, c_ptr
+    use, intrinsic :: iso_c_binding, only: c_char, c_double, c_funptr, c_int32_t, c_int64_t, c_loc, c_null_char, &
+        c_null_ptr, c_ptr
     implicit none
-    private :: c_char, c_double, c_funptr, c_int32_t, c_int64_t, c_null_char, c_ptr
+    private :: c_char, c_double, c_funptr, c_int32_t, c_int64_t, c_loc, c_null_char, c_null_ptr, c_ptr
+    private :: c_create, c_set_box, c_set_particles, c_step, c_plan, text_of_string, text_of_array
 
     integer(c_int32_t), parameter :: DIFFUSPH_DONE = 0
     integer(c_int32_t), parameter :: DIFFUSPH_STEP_TOO_LARGE = 1
@@ -93,12 +96,18 @@ module diffusph
         end subroutine
     end interface
 
+    ! The C string in a buffer as a Fortran text.
+    interface diffusph_text
+        module procedure text_of_string, text_of_array
+    end interface
+
     interface
-        function diffusph_create(words, s, why, why_len) bind(c) result(status)
+        ! Those with optional arguments have theirs below: before Fortran 2018, C's are not optional.
+        function c_create(words, s, why, why_len) bind(c, name='diffusph_create') result(status)
             import :: c_char, c_int32_t, c_int64_t, c_ptr
             character(kind=c_char), intent(in) :: words(*)
             type(c_ptr), intent(inout) :: s
-            character(kind=c_char), intent(inout), optional :: why(*)
+            type(c_ptr), value :: why
             integer(c_int64_t), value :: why_len
             integer(c_int32_t) :: status
         end function
@@ -131,21 +140,21 @@ module diffusph
             integer(c_int32_t) :: status
         end function
 
-        function diffusph_set_box(s, lo, hi, periodic) bind(c) result(status)
+        function c_set_box(s, lo, hi, periodic) bind(c, name='diffusph_set_box') result(status)
             import :: c_double, c_int32_t, c_ptr
             type(c_ptr), value :: s
             real(c_double), intent(in) :: lo(*), hi(*)
-            integer(c_int32_t), intent(in), optional :: periodic(*)
+            type(c_ptr), value :: periodic
             integer(c_int32_t) :: status
         end function
 
-        function diffusph_set_particles(s, n, x, stride, m, rho, h) bind(c) result(status)
+        function c_set_particles(s, n, x, stride, m, rho, h) bind(c, name='diffusph_set_particles') result(status)
             import :: c_double, c_int32_t, c_int64_t, c_ptr
             type(c_ptr), value :: s
             integer(c_int64_t), value :: n
             real(c_double), intent(in) :: x(*)
             integer(c_int64_t), value :: stride
-            real(c_double), intent(in), optional :: m(*), rho(*), h(*)
+            type(c_ptr), value :: m, rho, h
             integer(c_int32_t) :: status
         end function
 
@@ -205,11 +214,11 @@ module diffusph
             integer(c_int32_t) :: status
         end function
 
-        function diffusph_step(s, dt, report) bind(c) result(status)
-            import :: c_double, c_int32_t, c_ptr, diffusph_report
+        function c_step(s, dt, report) bind(c, name='diffusph_step') result(status)
+            import :: c_double, c_int32_t, c_ptr
             type(c_ptr), value :: s
             real(c_double), value :: dt
-            type(diffusph_report), intent(inout), optional :: report
+            type(c_ptr), value :: report
             integer(c_int32_t) :: status
         end function
 
@@ -234,12 +243,12 @@ module diffusph
             integer(c_int32_t) :: status
         end function
 
-        function diffusph_plan(s, buf, len, needed) bind(c) result(status)
-            import :: c_char, c_int32_t, c_int64_t, c_ptr
+        function c_plan(s, buf, len, needed) bind(c, name='diffusph_plan') result(status)
+            import :: c_int32_t, c_int64_t, c_ptr
             type(c_ptr), value :: s
-            character(kind=c_char), intent(inout), optional :: buf(*)
+            type(c_ptr), value :: buf
             integer(c_int64_t), value :: len
-            integer(c_int64_t), intent(inout), optional :: needed
+            type(c_ptr), value :: needed
             integer(c_int32_t) :: status
         end function
 
@@ -354,32 +363,114 @@ module diffusph
 
 contains
 
+    ! All are recursive, so that -fno-automatic does not share what is theirs between threads.
+
+    recursive function diffusph_create(words, s, why, why_len) result(status)
+        character(kind=c_char), intent(in) :: words(*)
+        type(c_ptr), intent(inout) :: s
+        character(kind=c_char), intent(inout), optional, target :: why(*)
+        integer(c_int64_t), value :: why_len
+        integer(c_int32_t) :: status
+        type(c_ptr) :: to_why
+        to_why = c_null_ptr
+        if (present(why)) to_why = c_loc(why(1))
+        status = c_create(words, s, to_why, why_len)
+    end function
+
+    recursive function diffusph_set_box(s, lo, hi, periodic) result(status)
+        type(c_ptr), value :: s
+        real(c_double), intent(in) :: lo(*), hi(*)
+        integer(c_int32_t), intent(in), optional, target :: periodic(*)
+        integer(c_int32_t) :: status
+        type(c_ptr) :: to_periodic
+        to_periodic = c_null_ptr
+        if (present(periodic)) to_periodic = c_loc(periodic(1))
+        status = c_set_box(s, lo, hi, to_periodic)
+    end function
+
+    recursive function diffusph_set_particles(s, n, x, stride, m, rho, h) result(status)
+        type(c_ptr), value :: s
+        integer(c_int64_t), value :: n
+        real(c_double), intent(in) :: x(*)
+        integer(c_int64_t), value :: stride
+        real(c_double), intent(in), optional, target :: m(*), rho(*), h(*)
+        integer(c_int32_t) :: status
+        type(c_ptr) :: to_m, to_rho, to_h
+        to_m = c_null_ptr
+        to_rho = c_null_ptr
+        to_h = c_null_ptr
+        if (present(m)) to_m = c_loc(m(1))
+        if (present(rho)) to_rho = c_loc(rho(1))
+        if (present(h)) to_h = c_loc(h(1))
+        status = c_set_particles(s, n, x, stride, to_m, to_rho, to_h)
+    end function
+
+    recursive function diffusph_step(s, dt, report) result(status)
+        type(c_ptr), value :: s
+        real(c_double), value :: dt
+        type(diffusph_report), intent(inout), optional, target :: report
+        integer(c_int32_t) :: status
+        type(c_ptr) :: to_report
+        to_report = c_null_ptr
+        if (present(report)) to_report = c_loc(report)
+        status = c_step(s, dt, to_report)
+    end function
+
+    recursive function diffusph_plan(s, buf, len, needed) result(status)
+        type(c_ptr), value :: s
+        character(kind=c_char), intent(inout), optional, target :: buf(*)
+        integer(c_int64_t), value :: len
+        integer(c_int64_t), intent(inout), optional, target :: needed
+        integer(c_int32_t) :: status
+        type(c_ptr) :: to_buf, to_needed
+        to_buf = c_null_ptr
+        to_needed = c_null_ptr
+        if (present(buf)) to_buf = c_loc(buf(1))
+        if (present(needed)) to_needed = c_loc(needed)
+        status = c_plan(s, to_buf, len, to_needed)
+    end function
+
     ! A Fortran text, without blanks at its end, as a C string.
-    pure function diffusph_c(text) result(string)
+    recursive function diffusph_c(text) result(string)
         character(len=*), intent(in) :: text
         character(kind=c_char, len=len_trim(text) + 1) :: string
         string = trim(text) // c_null_char
     end function
 
-    ! The C string in a buffer as a Fortran text.
-    pure function diffusph_text(buffer) result(text)
+    ! Texts of any length are the functions' own names: gfortran loses the length of those in result(), with
+    ! -fno-automatic.
+    recursive function text_of_string(buffer)
         character(kind=c_char, len=*), intent(in) :: buffer
-        character(len=:), allocatable :: text
+        character(len=:), allocatable :: text_of_string
         integer :: ends
         ends = index(buffer, c_null_char)
         if (ends == 0) ends = len(buffer) + 1
-        text = buffer(:ends - 1)
+        text_of_string = buffer(:ends - 1)
+    end function
+
+    recursive function text_of_array(buffer)
+        character(kind=c_char), intent(in) :: buffer(:)
+        character(len=:), allocatable :: text_of_array
+        integer :: i, ends
+        ends = size(buffer)
+        do i = size(buffer), 1, -1
+            if (buffer(i) == c_null_char) ends = i - 1
+        end do
+        text_of_array = repeat(' ', ends)
+        do i = 1, ends
+            text_of_array(i:i) = buffer(i)
+        end do
     end function
 
     ! What the last failed call on a solver had to say.
-    function diffusph_error(s) result(text)
+    recursive function diffusph_error(s)
         type(c_ptr), intent(in) :: s
-        character(len=:), allocatable :: text
+        character(len=:), allocatable :: diffusph_error
         character(kind=c_char, len=1024) :: buffer
         integer(c_int32_t) :: status
         buffer(1:1) = c_null_char
         status = diffusph_message(s, buffer, len(buffer, c_int64_t))
-        text = diffusph_text(buffer)
-        if (status /= DIFFUSPH_DONE .and. len(text) == 0) text = 'there is no message'
+        diffusph_error = text_of_string(buffer)
+        if (status /= DIFFUSPH_DONE .and. len(diffusph_error) == 0) diffusph_error = 'there is no message'
     end function
 end module

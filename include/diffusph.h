@@ -22,6 +22,9 @@
  * - Worker threads belong to the solver. In a host with OpenMP, OMP_WAIT_POLICY=passive keeps the host's idle threads
  *   from competing with them.
  * - The library prints nothing, installs no signal handler, and does not end the process.
+ * - Memory that the system refuses is answered with NO_MEMORY. Two things cannot be: threads that start with some hundred
+ *   bytes missing end the process (diffusph_create, except with threads=1), and a system that promises more memory than
+ *   it has ends processes of its choice; diffusph_plan tells what a scene takes, and memory= bounds it.
  * - The host's floating-point environment (traps, rounding, flushing) is put aside during a call and is back after it.
  *   Callbacks run in the default environment, on the thread of the call. They must not throw, nor jump out.
  *
@@ -42,7 +45,7 @@
 #include <stdint.h>
 
 /* The start of every report. */
-#define DIFFUSPH_REPORT_INIT {(int64_t)sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
+#define DIFFUSPH_REPORT_INIT {sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
 
 /**
  * Done.
@@ -282,7 +285,7 @@ typedef struct diffusph_report {
 
 #ifdef __cplusplus
 extern "C" {
-#endif // __cplusplus
+#endif /* __cplusplus */
 
 /**
  * Creates a solver from words like "heat dim=3 kernel=M6 operator=brookshaw integrator=rkl2"; the catalogue "words"
@@ -370,8 +373,8 @@ int32_t diffusph_set_particles(struct diffusph_solver *s,
 
 /**
  * A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. "x" moves
- * the particles; "u" sets T, which from then on follows where c_v is set; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
- * xy; xx, yy, zz, xy, yz, xz).
+ * the particles; "u" sets T, which from then on follows where c_v is set; "b" sets b_x, b_y and b_z at once (dim doubles
+ * per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy, xy; xx, yy, zz, xy, yz, xz).
  *
  * \param name   which
  * \param data   values; particle i at data[i * stride]
@@ -447,8 +450,9 @@ int32_t diffusph_step(struct diffusph_solver *s,
                       struct diffusph_report *report);
 
 /**
- * Makes the step (or rate, or limit) that is running now return CANCELLED, with nothing changed. From any thread, also
- * from a callback and from a signal handler; the solver must not be destroyed meanwhile. Does nothing if none is running.
+ * Makes the call that is running now return CANCELLED, with nothing changed; one whose work is nearly done may end as it
+ * would have. From any thread, also from a callback and from a signal handler; the solver must not be destroyed meanwhile.
+ * Does nothing if none is running.
  *
  * Errors: NULL_POINTER.
  */
@@ -637,7 +641,7 @@ int32_t diffusph_version_number(void);
 int32_t diffusph_abi_version(void);
 
 #ifdef __cplusplus
-}  // extern "C"
-#endif  // __cplusplus
+} /* extern "C" */
+#endif /* __cplusplus */
 
 #endif  /* DIFFUSPH_H */

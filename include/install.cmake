@@ -27,6 +27,8 @@ foreach(part MAJOR MINOR PATCH)
     string(REGEX MATCH "[0-9]+$" ${part} "${line}")
 endforeach()
 set(version "${MAJOR}.${MINOR}.${PATCH}")
+file(STRINGS "${root}/include/diffusph.h" line REGEX "^#define DIFFUSPH_ABI ")
+string(REGEX MATCH "[0-9]+$" ABI "${line}")
 set(shared "libdiffusph.so.${version}")
 # What the archive needs besides itself, as `rustc --print native-static-libs` says on Linux.
 set(system_libraries "-lgcc_s -lutil -lrt -lpthread -lm -ldl -lc")
@@ -38,10 +40,48 @@ foreach(file libdiffusph.so libdiffusph.a)
 endforeach()
 
 file(INSTALL "${root}/include/diffusph.h" "${root}/include/diffusph.f90" DESTINATION "${to}/include")
-file(INSTALL "${FROM}/libdiffusph.a" DESTINATION "${to}/lib")
 configure_file("${FROM}/libdiffusph.so" "${to}/lib/${shared}" COPYONLY)
-file(CREATE_LINK "${shared}" "${to}/lib/libdiffusph.so.${MAJOR}" SYMBOLIC)
-file(CREATE_LINK "libdiffusph.so.${MAJOR}" "${to}/lib/libdiffusph.so" SYMBOLIC)
+file(CREATE_LINK "${shared}" "${to}/lib/libdiffusph.so.${ABI}" SYMBOLIC)
+file(CREATE_LINK "libdiffusph.so.${ABI}" "${to}/lib/libdiffusph.so" SYMBOLIC)
+
+# The archive as one object that has no names but ours and keeps nothing that they do not use: other Rust libraries have
+# a Rust of their own. Without binutils it is installed as it is.
+find_program(LD ld)
+find_program(OBJCOPY objcopy)
+find_program(READELF readelf)
+find_program(AR ar)
+file(MAKE_DIRECTORY "${to}/lib")
+if(LD AND OBJCOPY AND READELF AND AR)
+    file(STRINGS "${root}/include/diffusph.h" lines REGEX "^int32_t diffusph_[a-z_]+\\(")
+    set(roots "")
+    foreach(line IN LISTS lines)
+        string(REGEX MATCH "diffusph_[a-z_]+" name "${line}")
+        list(APPEND roots -u ${name})
+    endforeach()
+    # What may be missing when a host is linked; ld -r forgets that.
+    execute_process(COMMAND "${READELF}" -sW "${FROM}/libdiffusph.a" OUTPUT_VARIABLE symbols ERROR_QUIET)
+    string(REGEX MATCHALL "WEAK +DEFAULT +UND +[A-Za-z0-9_]+" lines "${symbols}")
+    list(REMOVE_DUPLICATES lines)
+    set(weak "")
+    foreach(line IN LISTS lines)
+        string(REGEX MATCH "[A-Za-z0-9_]+$" name "${line}")
+        list(APPEND weak --weaken-symbol=${name})
+    endforeach()
+    set(object "${to}/lib/diffusph.o")
+    file(REMOVE "${to}/lib/libdiffusph.a")
+    foreach(command
+            "${LD};-r;--gc-sections;--force-group-allocation;${roots};${FROM}/libdiffusph.a;-o;${object}"
+            "${OBJCOPY};-w;--keep-global-symbol=diffusph_*;${weak};-R;.llvmbc;-R;.llvmcmd;${object}"
+            "${AR};rcs;${to}/lib/libdiffusph.a;${object}")
+        execute_process(COMMAND ${command} RESULT_VARIABLE failed ERROR_VARIABLE why)
+        if(failed)
+            message(FATAL_ERROR "${command}: ${why}")
+        endif()
+    endforeach()
+    file(REMOVE "${object}")
+else()
+    file(INSTALL "${FROM}/libdiffusph.a" DESTINATION "${to}/lib")
+endif()
 
 file(WRITE "${to}/lib/pkgconfig/diffusph.pc" "prefix=\${pcfiledir}/../..
 Name: diffusph
@@ -68,7 +108,7 @@ if(NOT TARGET diffusph::diffusph)
     add_library(diffusph::diffusph SHARED IMPORTED)
     set_target_properties(diffusph::diffusph PROPERTIES
         IMPORTED_LOCATION \"\${_prefix}/lib/${shared}\"
-        IMPORTED_SONAME libdiffusph.so.${MAJOR}
+        IMPORTED_SONAME libdiffusph.so.${ABI}
         INTERFACE_INCLUDE_DIRECTORIES \"\${_prefix}/include\")
     add_library(diffusph::static STATIC IMPORTED)
     set_target_properties(diffusph::static PROPERTIES

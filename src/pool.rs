@@ -4,6 +4,7 @@
 //! changes a bit of a result.
 
 use crate::error::{Error, Result};
+use crate::memory;
 use rayon::prelude::*;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, OnceLock};
@@ -177,20 +178,33 @@ fn join(handles: &Handles) -> usize {
     handles.into_iter().map(JoinHandle::join).count()
 }
 
+/// What a worker takes beside its stack until it waits for work, generously, in bytes.
+const WORKER: usize = 1 << 17;
+
+/// The stack of a worker, in bytes: the environment (RUST_MIN_STACK) has no say.
+const STACK: usize = 2 << 20;
+
+/// Workers that run: all that they need to begin is there when this returns.
 fn spawn_workers(threads: usize, handles: &Handles) -> Result<rayon::ThreadPool> {
+    // Where a few bytes for a thread are missing, those who make it end the process: see whether there are some.
+    drop(memory::reserved::<u8>("worker threads", threads.saturating_mul(WORKER))?);
     let kept = Arc::clone(handles);
-    rayon::ThreadPoolBuilder::new()
+    let workers = rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .spawn_handler(move |thread| {
             let name = format!("diffusph-{}", thread.index());
-            let handle = std::thread::Builder::new().name(name).spawn(|| thread.run())?;
+            let handle = std::thread::Builder::new().name(name).stack_size(STACK).spawn(|| thread.run())?;
             if let Ok(mut list) = kept.lock() {
                 list.push(handle);
             }
             Ok(())
         })
         .build()
-        .map_err(|e| Error::bad("threads", threads, &format!("the system would not start them ({e}); ask for fewer")))
+        .map_err(|e| {
+            Error::bad("threads", threads, &format!("the system would not start them ({e}); ask for fewer"))
+        })?;
+    workers.broadcast(|_| ());
+    Ok(workers)
 }
 
 #[cfg(test)]

@@ -48,7 +48,8 @@ impl<'a> Words<'a> {
         let Some(text) = self.take(key) else { return Ok(None) };
         match text.parse::<f64>() {
             Ok(value) if rule(value) => Ok(Some(value)),
-            _ => Err(Error::bad(key, format!("'{text}'"), sentence)),
+            Ok(_) => Err(Error::bad(key, format!("'{text}'"), sentence)),
+            Err(_) => Err(Error::bad(key, format!("'{text}'"), &format!("it must be a number; {sentence}"))),
         }
     }
 
@@ -124,6 +125,12 @@ mod tests {
             assert!(Words::parse("words", line).is_err(), "{line}");
         }
         let mut w = Words::parse("words", "dim=4 T=1,x stages=-1").unwrap();
+        let text = Words::parse("words", "h_fac=abc")
+            .unwrap()
+            .number("h_fac", "positive", |v| v > 0.0)
+            .unwrap_err()
+            .to_string();
+        assert!(text.contains("must be a number"), "{text}");
         assert!(w.count("dim", 1..=3).is_err() && w.list("T").is_err() && w.count("stages", 1..=9).is_err());
     }
 }

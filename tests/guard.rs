@@ -237,6 +237,48 @@ mod environment {
         unsafe { (*seen.cast::<Mutex<Vec<i32>>>()).lock().unwrap().push(fegetexcept()) };
     }
 
+    unsafe extern "C-unwind" fn halves(
+        _: *mut c_void,
+        _: f64,
+        n: i64,
+        _: *const u32,
+        t: *const f64,
+        out: *mut f64,
+    ) -> i32 {
+        // SAFETY: the library's word.
+        (0..n as usize).for_each(|i| unsafe { *out.add(i) = -0.5 * *t.add(i) });
+        0
+    }
+
+    unsafe extern "C-unwind" fn halves_and_rounds(
+        user: *mut c_void,
+        time: f64,
+        n: i64,
+        particle: *const u32,
+        t: *const f64,
+        out: *mut f64,
+    ) -> i32 {
+        // SAFETY: the library's word.
+        let answer = unsafe { halves(user, time, n, particle, t, out) };
+        unsafe { fesetround(UPWARD) };
+        answer
+    }
+
+    #[test]
+    fn what_a_callback_leaves_of_the_environment_changes_nothing() {
+        let temperatures = |callback: FieldCallback| {
+            let host = Host::ready("heat dim=2 threads=1");
+            // SAFETY: the callback uses nothing of the host's.
+            assert_eq!(unsafe { diffusph_set_source_callback(host.s, callback, null_mut()) }, 0);
+            steps(&host)
+        };
+        let usual = temperatures(Some(halves));
+        assert!(usual == temperatures(Some(halves_and_rounds)));
+        assert!(usual != temperatures(None), "a control");
+        // SAFETY: this thread's own environment.
+        assert_eq!(unsafe { fegetround() }, 0);
+    }
+
     fn steps(host: &Host) -> Vec<Result<Vec<u64>, i32>> {
         // SAFETY: the places are the host's.
         assert_eq!(unsafe { diffusph_step(host.s, 1e-2, null_mut()) }, 0);
@@ -272,6 +314,41 @@ mod environment {
         let seen = seen.lock().unwrap();
         assert!(!seen.is_empty() && seen.iter().all(|traps| *traps == 0), "{seen:?}");
     }
+}
+
+#[test]
+fn a_refused_solver_leaves_no_threads_and_says_why() {
+    let (mut s, mut why) = (null_mut(), [0 as c_char; 200]);
+    // No other test here has a tenth worker.
+    for words in
+        ["heat threads=10 kernel=M9", "heat threads=10 dim=4", "heat threads=10 h_fac=-1", "heat threads=10 x=1"]
+    {
+        // SAFETY: the places are ours.
+        assert!(unsafe { diffusph_create(c(words), &mut s, why.as_mut_ptr(), 200) } < 0 && s.is_null());
+        assert_ne!(why[0], 0, "{words}");
+        let tasks = std::fs::read_dir("/proc/self/task").unwrap();
+        let names = tasks.filter_map(|t| std::fs::read_to_string(t.ok()?.path().join("comm")).ok());
+        assert_eq!(names.filter(|name| name.trim_end() == "diffusph-9").count(), 0, "{words}");
+    }
+}
+
+#[test]
+fn cancel_stops_what_runs_and_nothing_else() {
+    let host = Host::ready("heat dim=2 threads=2");
+    let step = || unsafe { diffusph_step(host.s, 1e-3, null_mut()) };
+    // SAFETY: the solver is the host's.
+    assert_eq!(unsafe { diffusph_cancel(host.s) }, 0);
+    assert_eq!(step(), 0, "nothing ran when it was cancelled");
+    unsafe extern "C-unwind" fn cancels(s: *mut c_void, _: f64, _: f64) -> i32 {
+        // SAFETY: the test's word.
+        unsafe { diffusph_cancel(s.cast()) };
+        0
+    }
+    // SAFETY: as above.
+    assert_eq!(unsafe { diffusph_set_progress_callback(host.s, Some(cancels), host.s.cast()) }, 0);
+    assert_eq!(step(), 5);
+    unsafe { diffusph_set_progress_callback(host.s, None, null_mut()) };
+    assert_eq!(step(), 0, "it was another step that was cancelled");
 }
 
 /// Runs all other tests here again, mistakes and panics included, and looks at what reaches the terminal.

@@ -1,36 +1,37 @@
 //! Damaged and forged files: an error at worst, never a panic, never memory on the file's word.
 
 use diffusph::io::{self, Data, Encoding, Field, Options, Snapshot};
-use std::alloc::{GlobalAlloc, Layout, System};
+use std::ffi::c_void;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering::Relaxed};
 
-/// The system's allocator, which remembers the largest request.
-struct Watched;
-
+/// The largest request for memory: this program has C's functions for it in place of the system's.
 static LARGEST: AtomicUsize = AtomicUsize::new(0);
 
-// SAFETY: every call is handed on unchanged.
-unsafe impl GlobalAlloc for Watched {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        LARGEST.fetch_max(layout.size(), Relaxed);
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn alloc_zeroed(&self, layout: Layout) -> *mut u8 {
-        LARGEST.fetch_max(layout.size(), Relaxed);
-        unsafe { System.alloc_zeroed(layout) }
-    }
-    unsafe fn realloc(&self, place: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        LARGEST.fetch_max(size, Relaxed);
-        unsafe { System.realloc(place, layout, size) }
-    }
-    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
-        unsafe { System.dealloc(place, layout) }
-    }
+unsafe extern "C" {
+    fn __libc_malloc(size: usize) -> *mut c_void;
+    fn __libc_calloc(n: usize, size: usize) -> *mut c_void;
+    fn __libc_realloc(place: *mut c_void, size: usize) -> *mut c_void;
 }
 
-#[global_allocator]
-static ALLOCATOR: Watched = Watched;
+// SAFETY of these three: every call is handed on unchanged.
+#[unsafe(no_mangle)]
+unsafe extern "C" fn malloc(size: usize) -> *mut c_void {
+    LARGEST.fetch_max(size, Relaxed);
+    unsafe { __libc_malloc(size) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn calloc(n: usize, size: usize) -> *mut c_void {
+    LARGEST.fetch_max(n.saturating_mul(size), Relaxed);
+    unsafe { __libc_calloc(n, size) }
+}
+
+#[unsafe(no_mangle)]
+unsafe extern "C" fn realloc(place: *mut c_void, size: usize) -> *mut c_void {
+    LARGEST.fetch_max(size, Relaxed);
+    unsafe { __libc_realloc(place, size) }
+}
 
 /// The files here have some 2000 bytes. 2000 bytes of zlib can honestly hold 2 MB.
 const ALLOWED: usize = 4 << 20;

@@ -131,6 +131,7 @@ fn spacing(x: &[f64], dim: usize) -> Result<Option<(f64, f64)>> {
             |i| open[i],
             |row| {
                 found[row.i] = row.r.iter().copied().fold(f64::INFINITY, f64::min);
+                Ok(())
             },
         )?;
         h.iter_mut().zip(&found).filter(|(_, r)| r.is_infinite()).for_each(|(h, _)| *h *= 2.0);

@@ -1,5 +1,6 @@
 //! Functions that a host lends. They run on the thread of the call, never on a worker.
 
+use super::environment::restore_default;
 use super::guard::{Handle, with};
 use crate::model::heat;
 use std::ffi::{CString, c_char, c_void};
@@ -51,6 +52,7 @@ impl Log {
         if let Ok(text) = CString::new(text.replace('\0', " ")) {
             // SAFETY: the host's word.
             unsafe { (self.function)(self.user.get(), level, text.as_ptr()) };
+            restore_default();
         }
     }
 }
@@ -59,7 +61,9 @@ fn field(callback: FieldCallback, user: *mut c_void) -> Option<heat::Callback> {
     let (function, user) = (callback?, User(user));
     Some(Box::new(move |time, host: &[u32], t: &[f64], out: &mut [f64]| {
         // SAFETY: the slices are as long as is said; the rest is the host's word.
-        unsafe { function(user.get(), time, t.len() as i64, host.as_ptr(), t.as_ptr(), out.as_mut_ptr()) }
+        let answer = unsafe { function(user.get(), time, t.len() as i64, host.as_ptr(), t.as_ptr(), out.as_mut_ptr()) };
+        restore_default();
+        answer
     }))
 }
 
@@ -114,8 +118,12 @@ pub unsafe extern "C" fn diffusph_set_progress_callback(
     unsafe {
         with(s, |inside| {
             inside.solver.set_progress_callback(callback.map(|function| {
-                // SAFETY: the host's word.
-                Box::new(move |time, share| function(user.get(), time, share)) as _
+                Box::new(move |time, share| {
+                    // SAFETY: the host's word.
+                    let answer = function(user.get(), time, share);
+                    restore_default();
+                    answer
+                }) as _
             }));
             Ok(())
         })

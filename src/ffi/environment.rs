@@ -11,6 +11,11 @@ impl Environment {
     }
 }
 
+/// Puts the default environment in place again, after a function of the host that may have left another.
+pub fn restore_default() {
+    imp::save_and_reset();
+}
+
 impl Drop for Environment {
     fn drop(&mut self) {
         imp::restore(&self.0);

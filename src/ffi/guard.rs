@@ -9,14 +9,14 @@ use crate::solver::Solver;
 use std::any::Any;
 use std::cell::{Cell, UnsafeCell};
 use std::panic::{AssertUnwindSafe, catch_unwind, set_hook, take_hook};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Once};
 
 /// A solver. Use it from any thread, one call at a time.
 pub struct Handle {
     busy: AtomicBool,
     cancel: Arc<AtomicBool>,
-    created_by: u32,
+    created_by: Process,
     inside: UnsafeCell<Inside>,
 }
 
@@ -32,6 +32,28 @@ pub struct Inside {
     broken: Option<String>,
 }
 
+/// A process, told from the one that it was forked from also where both have the same number, as the first processes of
+/// containers have.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Process {
+    id: u32,
+    /// How often a process has been forked on the way here.
+    generation: u64,
+}
+
+impl Process {
+    fn this() -> Process {
+        static GENERATION: AtomicU64 = AtomicU64::new(0);
+        static COUNTED: Once = Once::new();
+        extern "C" fn count() {
+            GENERATION.fetch_add(1, Ordering::Relaxed);
+        }
+        // SAFETY: the function does one atomic addition, which a forked child may do.
+        COUNTED.call_once(|| _ = unsafe { libc::pthread_atfork(None, None, Some(count)) });
+        Process { id: std::process::id(), generation: GENERATION.load(Ordering::Relaxed) }
+    }
+}
+
 // SAFETY: `inside` is reached only by whoever has set `busy`.
 unsafe impl Sync for Handle {}
 
@@ -39,7 +61,7 @@ impl Handle {
     pub fn new(solver: Solver) -> Handle {
         let cancel = solver.canceller();
         let inside = Inside { solver, message: String::new(), log: None, logged_plan: String::new(), broken: None };
-        Handle { busy: AtomicBool::new(false), cancel, created_by: std::process::id(), inside: UnsafeCell::new(inside) }
+        Handle { busy: AtomicBool::new(false), cancel, created_by: Process::this(), inside: UnsafeCell::new(inside) }
     }
 
     /// Stops the running call, if there is one; atomics and nothing else, so that signal handlers may do it.
@@ -51,8 +73,8 @@ impl Handle {
 
     /// Whether this process has the handle's threads.
     pub fn check_process(&self) -> Result<()> {
-        let (created, now) = (self.created_by, std::process::id());
-        if created == now { Ok(()) } else { Err(Error::Forked { created, now }) }
+        let (created, now) = (self.created_by, Process::this());
+        if created == now { Ok(()) } else { Err(Error::Forked { created: created.id, now: now.id }) }
     }
 
     /// Enters, unless another call is inside.
@@ -205,6 +227,22 @@ mod tests {
         let mut entered = handle.enter().unwrap();
         let text = &entered.inside().message;
         assert!(text.contains("number 7") && text.contains("destroy"), "{text}");
+    }
+
+    #[test]
+    fn a_child_is_another_process_whatever_its_number() {
+        let parent = Process::this();
+        // SAFETY: the child compares two numbers and leaves.
+        unsafe {
+            let child = libc::fork();
+            if child == 0 {
+                libc::_exit(i32::from(Process { id: parent.id, ..Process::this() } == parent));
+            }
+            let mut status = 0;
+            libc::waitpid(child, &mut status, 0);
+            assert!(libc::WIFEXITED(status) && libc::WEXITSTATUS(status) == 0);
+        }
+        assert_eq!(Process::this(), parent);
     }
 
     #[test]

@@ -72,8 +72,8 @@ pub unsafe extern "C" fn diffusph_set_particles(
 }
 
 /// A quantity of each particle, in the host's order; the catalogue "fields" lists them with their units. "x" moves
-/// the particles; "u" sets T, which from then on follows where c_v is set; "b" sets b_x, b_y and b_z at once (dim doubles per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy,
-/// xy; xx, yy, zz, xy, yz, xz).
+/// the particles; "u" sets T, which from then on follows where c_v is set; "b" sets b_x, b_y and b_z at once (dim doubles
+/// per particle) and "kappa_ij" a symmetric tensor (xx; xx, yy, xy; xx, yy, zz, xy, yz, xz).
 ///
 /// \param name   which
 /// \param data   values; particle i at data[i * stride]

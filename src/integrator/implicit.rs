@@ -135,7 +135,7 @@ fn solve(
         });
         let rounding = ROUNDING * (1.0 + g * sum::max(pool, n, |i| diagonal[i]));
         if rounding.is_nan() || rounding > ILLEGIBLE {
-            return Err(unsolved(0, rounding, ILLEGIBLE));
+            return Err(unsolved(0, limits.iterations, rounding, ILLEGIBLE));
         }
         size = sum::max(pool, n, |i| y[i].abs()).max(change).max(size);
         // The base of a second stage is as large as g times a rate: its rounding counts once.
@@ -160,7 +160,7 @@ fn solve(
         taken = Taken { share: taken.next(), before: worst };
         add(pool, y, taken.share, correction);
     }
-    Err(unsolved(spent, worst, wanted))
+    Err(unsolved(spent, limits.iterations, worst, wanted))
 }
 
 /// The share of the last correction that is in y, and the largest residual before it.

@@ -39,7 +39,7 @@ impl Equations<'_> {
     pub fn solve(&mut self, target: f64, most: u64, [x, r, p, q]: [&mut [f64]; 4]) -> Result<u64> {
         let (Shifted { g, weight, .. }, pool, n) = (self.shifted, self.pool, r.len());
         p.fill(0.0);
-        let (mut length, mut residual) = (f64::INFINITY, f64::INFINITY);
+        let (mut length, mut residual, mut done) = (f64::INFINITY, f64::INFINITY, most);
         for iteration in 0..=most {
             residual = sum::max(pool, n, |i| r[i].abs());
             if residual <= target {
@@ -60,12 +60,13 @@ impl Equations<'_> {
             let step = length / curvature;
             // Also where nothing is left but underflow, or an overflow: a step that is no number helps nobody.
             if !(curvature > 0.0 && step.is_finite()) {
+                done = iteration;
                 break;
             }
             add(pool, x, step, p);
             add(pool, r, -step, q);
         }
-        Err(unsolved(most, residual, target))
+        Err(unsolved(done, most, residual, target))
     }
 
     /// Starts `x` for the right-hand side `r`, which becomes the residual: from zero; or, where a step is so long that
@@ -105,8 +106,13 @@ pub fn add(pool: &Pool, to: &mut [f64], factor: f64, what: &[f64]) {
     });
 }
 
-pub fn unsolved(iterations: u64, residual: f64, wanted: f64) -> Error {
+/// What was not solved, and what may help: more iterations only where all of them were used.
+pub fn unsolved(iterations: u64, most: u64, residual: f64, wanted: f64) -> Error {
     let what = "the solution of an implicit stage".to_string();
-    let remedy = "nothing was changed: take a smaller dt, or raise max_iterations or solver_tolerance".to_string();
+    let remedy = match iterations < most {
+        true => "rounding leaves no more of a step so long: take a smaller dt, or raise solver_tolerance",
+        false => "take a smaller dt, or raise max_iterations or solver_tolerance",
+    };
+    let remedy = format!("nothing was changed: {remedy}");
     Error::NotConverged { what, iterations, residual, wanted, remedy }
 }

@@ -88,7 +88,8 @@ impl Version {
             let (place, what) = line.split_once(" - ")?;
             let mut what = what.split(' ');
             let (kind, options) = (what.next()?, what.nth(1)?);
-            let here = kind == self.kind && (self.controller.is_empty() || options.split(',').any(|o| o == self.controller));
+            let here =
+                kind == self.kind && (self.controller.is_empty() || options.split(',').any(|o| o == self.controller));
             let mut place = place.split(' ').skip(3);
             if here { Some((place.next()?, place.next()?)) } else { None }
         })?;

@@ -9,7 +9,7 @@ pub use limits::available;
 use reserve::{is_low, refusable};
 use std::collections::TryReserveError;
 
-#[cfg(not(feature = "host-allocator"))]
+#[cfg(feature = "reserve")]
 #[global_allocator]
 static ALLOCATOR: reserve::Allocator = reserve::Allocator;
 
@@ -73,11 +73,7 @@ pub fn reserved<T>(what: &str, n: usize) -> Result<Vec<T>> {
 }
 
 /// Asks for room for `n` items; `NoMemory` where the system has none, or only the reserve is left.
-pub fn granted<T>(
-    what: &str,
-    n: usize,
-    ask: impl FnOnce() -> std::result::Result<(), TryReserveError>,
-) -> Result<()> {
+pub fn granted<T>(what: &str, n: usize, ask: impl FnOnce() -> std::result::Result<(), TryReserveError>) -> Result<()> {
     if is_low() || refusable(ask).is_err() { Err(no_memory::<T>(what, n)) } else { Ok(()) }
 }
 

@@ -9,8 +9,11 @@ use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::{Cell, UnsafeCell};
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// Bytes; a step on 144 particles with every allocation refused takes some thousands.
+/// Bytes.
 const SIZE: usize = 1 << 20;
+/// Blocks begin at multiples of this.
+const GRAIN: usize = 64;
+const GRAINS: usize = SIZE / GRAIN;
 
 pub struct Allocator;
 
@@ -21,59 +24,65 @@ struct Bytes(UnsafeCell<[u8; SIZE]>);
 unsafe impl Sync for Bytes {}
 
 static BYTES: Bytes = Bytes(UnsafeCell::new([0; SIZE]));
-static RESERVE: Lock = Lock { taken: AtomicBool::new(false), stack: UnsafeCell::new(Stack { top: 0, blocks: 0 }) };
+static RESERVE: Lock = Lock { taken: AtomicBool::new(false), map: UnsafeCell::new(Map::EMPTY) };
 
 thread_local! {
     /// Whether this thread can take a refusal.
     static REFUSABLE: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Blocks one above the other. Those below the top are not reused before all are free, which is soon: a call that met the
-/// end of memory is over.
-struct Stack {
-    top: usize,
-    blocks: usize,
+/// Which grains are taken.
+struct Map {
+    taken: [bool; GRAINS],
+    count: usize,
 }
 
 struct Lock {
     taken: AtomicBool,
-    stack: UnsafeCell<Stack>,
+    map: UnsafeCell<Map>,
 }
 
 // SAFETY: `with` lets one thread in at a time.
 unsafe impl Sync for Lock {}
 
 impl Lock {
-    fn with<T>(&self, work: impl FnOnce(&mut Stack) -> T) -> T {
+    fn with<T>(&self, work: impl FnOnce(&mut Map) -> T) -> T {
         while self.taken.swap(true, Ordering::Acquire) {
             std::hint::spin_loop();
         }
         // SAFETY: the lock is taken, and `work` neither allocates nor panics.
-        let result = work(unsafe { &mut *self.stack.get() });
+        let result = work(unsafe { &mut *self.map.get() });
         self.taken.store(false, Ordering::Release);
         result
     }
 }
 
-impl Stack {
-    /// Where a block of this layout begins, or `None` where it does not fit.
-    fn push(&mut self, layout: Layout) -> Option<usize> {
-        let start = self.top.checked_next_multiple_of(layout.align())?;
-        let end = start.checked_add(layout.size())?;
-        if end > SIZE || layout.align() > align_of::<Bytes>() {
-            return None;
+impl Map {
+    const EMPTY: Map = Map { taken: [false; GRAINS], count: 0 };
+
+    /// Where the first gap begins that this layout fits in.
+    fn take(&mut self, layout: Layout) -> Option<usize> {
+        let (grains, step) = (layout.size().div_ceil(GRAIN), layout.align().div_ceil(GRAIN));
+        let mut first = 0;
+        while first + grains <= GRAINS {
+            match self.taken[first..first + grains].iter().rposition(|taken| *taken) {
+                None => {
+                    self.mark(first, grains, true);
+                    return Some(first * GRAIN);
+                }
+                Some(last) => first = (first + last + 1).next_multiple_of(step),
+            }
         }
-        (self.top, self.blocks) = (end, self.blocks + 1);
-        Some(start)
+        None
     }
 
-    fn pop(&mut self, start: usize, size: usize) {
-        self.blocks -= 1;
-        if self.blocks == 0 {
-            self.top = 0;
-        } else if start + size == self.top {
-            self.top = start;
-        }
+    fn give_back(&mut self, start: usize, size: usize) {
+        self.mark(start / GRAIN, size.div_ceil(GRAIN), false);
+    }
+
+    fn mark(&mut self, first: usize, grains: usize, taken: bool) {
+        self.taken[first..first + grains].fill(taken);
+        self.count = if taken { self.count + grains } else { self.count - grains };
     }
 }
 
@@ -87,14 +96,14 @@ pub fn refusable<T>(work: impl FnOnce() -> T) -> T {
 
 /// Whether so much of the reserve is in use that nothing large should begin.
 pub fn is_low() -> bool {
-    RESERVE.with(|stack| stack.top > SIZE / 2)
+    RESERVE.with(|map| map.count > GRAINS / 2)
 }
 
 fn take(layout: Layout) -> *mut u8 {
     if REFUSABLE.get() {
         return std::ptr::null_mut();
     }
-    match RESERVE.with(|stack| stack.push(layout)) {
+    match RESERVE.with(|map| if layout.align() > align_of::<Bytes>() { None } else { map.take(layout) }) {
         // SAFETY: the block lies inside.
         Some(start) => unsafe { BYTES.0.get().cast::<u8>().add(start) },
         None => std::ptr::null_mut(),
@@ -131,7 +140,7 @@ unsafe impl GlobalAlloc for Allocator {
 
     unsafe fn dealloc(&self, block: *mut u8, layout: Layout) {
         match place(block) {
-            Some(start) => RESERVE.with(|stack| stack.pop(start, layout.size())),
+            Some(start) => RESERVE.with(|map| map.give_back(start, layout.size())),
             // SAFETY: what is not the reserve's is the system's.
             None => unsafe { System.dealloc(block, layout) },
         }
@@ -164,18 +173,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn blocks_do_not_overlap_and_the_reserve_is_whole_again_when_all_are_free() {
-        let mut stack = Stack { top: 0, blocks: 0 };
+    fn blocks_do_not_overlap_and_gaps_are_used_again() {
+        let mut map = Map::EMPTY;
         let layout = |size, align| Layout::from_size_align(size, align).unwrap();
-        let first = stack.push(layout(3, 1)).unwrap();
-        let second = stack.push(layout(8, 8)).unwrap();
-        assert!(first + 3 <= second && second % 8 == 0);
-        assert_eq!(stack.push(layout(SIZE, 1)), None);
-        stack.pop(second, 8);
-        assert_eq!(stack.push(layout(8, 8)), Some(second), "the last is reused at once");
-        stack.pop(first, 3);
-        stack.pop(second, 8);
-        assert_eq!(stack.push(layout(SIZE, 4096)), Some(0));
+        let blocks = [map.take(layout(3, 1)), map.take(layout(65, 8)), map.take(layout(1, 256))];
+        assert_eq!(blocks, [Some(0), Some(64), Some(256)]);
+        assert_eq!(map.take(layout(SIZE, 1)), None);
+        assert_eq!(map.take(layout(128, 64)), Some(320));
+        map.give_back(64, 65);
+        assert_eq!(map.take(layout(192, 64)), Some(64), "with the gap behind it");
+        [(0, 3), (64, 192), (256, 1), (320, 128)].into_iter().for_each(|(start, size)| map.give_back(start, size));
+        assert_eq!((map.count, map.take(layout(SIZE, 4096))), (0, Some(0)));
     }
 
     #[test]

@@ -13,16 +13,15 @@ use crate::space::{Scratch, rows::Rows};
 pub fn of<const D: usize>(rows: &Rows, unit: f64, pool: &Pool) -> Result<Vec<Vec<[f32; D]>>> {
     let n = rows.cloud.len();
     let blocks = pool.map_init(n.div_ceil(BLOCK), Scratch::default, |scratch, b| {
-        let (mut block, mut room) = (Vec::new(), Ok(()));
+        let mut block = Vec::new();
         rows.visit(b * BLOCK..((b + 1) * BLOCK).min(n), scratch, |row| {
-            if let Err(e) = memory::room("pairs", &mut block, row.len()) {
-                return room = Err(e);
-            }
+            memory::room("pairs", &mut block, row.len())?;
             block.extend(
                 (0..row.len()).map(|k| std::array::from_fn(|a| row.d[a].get(k).map_or(0.0, |d| (d / unit) as f32))),
             );
+            Ok(())
         })?;
-        room.map(|()| block)
+        Ok(block)
     });
     blocks.into_iter().collect()
 }

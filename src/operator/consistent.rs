@@ -265,6 +265,7 @@ mod tests {
                 assert_eq!(fit_anywhere(&assembly, &row, &mut other, &mut plain).unwrap(), reached);
                 assert!(w.iter().zip(&other).all(|(a, b)| a.to_bits() == b.to_bits()), "{dim}-D order {reached}");
                 met[reached as usize] += 1;
+                Ok(())
             })
             .unwrap();
         }

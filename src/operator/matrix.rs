@@ -172,14 +172,12 @@ impl Matrix {
         let failed = std::sync::Mutex::new(None);
         pool.chunks(&mut self.blocks, 1, |_, part| {
             for Block { first, start, coef, .. } in part {
-                let (mut buffers, mut inner, range) = (B::default(), Ok(()), *first..*first + start.len() - 1);
+                let (mut buffers, range) = (B::default(), *first..*first + start.len() - 1);
                 let found = rows.visit_where(range, &mut Scratch::default(), &wanted, |row| {
                     let from = start[row.i - *first] as usize;
-                    if let Err(e) = change(&mut buffers, &row, &mut coef[from..from + row.len()]) {
-                        inner = Err(e);
-                    }
+                    change(&mut buffers, &row, &mut coef[from..from + row.len()])
                 });
-                if let (Err(e), Ok(mut slot)) = (found.and(inner), failed.lock()) {
+                if let (Err(e), Ok(mut slot)) = (found, failed.lock()) {
                     *slot = Some(e);
                 }
             }

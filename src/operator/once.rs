@@ -144,10 +144,7 @@ impl Assembly<'_> {
     /// # Errors
     /// `NoMemory`.
     pub fn normalise(&self, matrix: &mut Matrix, normals: &Normals, pool: &Pool) -> Result<()> {
-        match self.operator.tensor {
-            Tensor::Stencils | Tensor::Projected => Ok(()),
-            _ => normalise::scale(self, matrix, normals, pool),
-        }
+        if self.operator.is_projected() { Ok(()) } else { normalise::scale(self, matrix, normals, pool) }
     }
 
     /// Whether rows are to be normalised by direction.
@@ -247,17 +244,13 @@ impl Assembly<'_> {
             paired: memory::reserved("rows", if self.is_consistent() { range.len() } else { 0 })?,
             defect: None,
         };
-        let mut failed = Ok(());
         let dim = self.kernel.dim() as f64;
         start.push(0);
         self.rows.visit(range, scratch, |row| {
-            let room = memory::room("matrix", &mut col, row.len()).and(memory::room("matrix", &mut coef, row.len()));
-            let w = match room.and_then(|()| self.weights(&row, buffers)) {
-                Ok(w) => w,
-                Err(e) => return failed = Err(e),
-            };
+            let w = self.weights(&row, buffers)?;
             let from = col.len();
-            col.extend_from_slice(row.j);
+            memory::appended("matrix columns", &mut col, row.j)?;
+            memory::room("matrix coefficients", &mut coef, row.len())?;
             coef.extend(self.coefficients(&row, w));
             normals.moments.push(moments::of_row(&coef[from..], row.r) / (2.0 * dim * self.volume[row.i]));
             if self.turns_pairs() {
@@ -267,8 +260,8 @@ impl Assembly<'_> {
                 normals.paired.push(buffers.order == 0);
             }
             start.push(col.len() as u32);
+            Ok(())
         })?;
-        failed?;
         *pairs = col.len() + col.len() / 64;
         Ok((Block::new(self.volume.len(), b, start, col, coef, seen)?, normals))
     }

@@ -1,6 +1,6 @@
 //! Every operator, a row each. Add an operator here.
 
-use super::{Normalise, projected};
+use super::{Normalise, projected, twice};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 
@@ -19,6 +19,9 @@ pub struct Operator {
     /// Fills `w` from distances `q`; `spare` is a buffer of the same length.
     pub weight: fn(kernel: &Kernel, q: &[f64], w: &mut [f64], spare: &mut [f64]),
 }
+
+/// Bytes of a stored matrix for each pair and for each particle: a column and a coefficient; a second moment.
+const MATRIX: [f64; 2] = [12.0, 8.0];
 
 /// How an operator takes a tensor kappa S, tr S = nu.
 #[derive(Debug, Clone, Copy)]
@@ -187,10 +190,25 @@ impl Operator {
         weighs && self.is_one_matrix()
     }
 
-    /// Bytes that making weights takes beside them while it lasts: for each pair, and for each particle.
-    pub fn bytes_to_make(&self, dim: usize) -> [f64; 2] {
+    /// Whether its weights are projected, which normalises them.
+    pub fn is_projected(&self) -> bool {
+        matches!(self.tensor, Tensor::Projected | Tensor::Stencils)
+    }
+
+    /// Bytes that stored weights take, for each pair and for each particle.
+    pub fn bytes(&self) -> [f64; 2] {
         match self.tensor {
-            Tensor::Projected | Tensor::Stencils => projected::bytes(dim),
+            Tensor::Twice { limited: false } => sum([MATRIX, twice::BYTES]),
+            // The limit is another matrix.
+            Tensor::Twice { limited: true } => sum([MATRIX, twice::BYTES, MATRIX]),
+            _ => MATRIX,
+        }
+    }
+
+    /// Bytes that projecting weights takes beside them while it lasts, where the operator does that.
+    pub fn bytes_to_project(&self, dim: usize) -> [f64; 2] {
+        match self.tensor {
+            Tensor::Projected | Tensor::Stencils | Tensor::Twice { limited: true } => projected::bytes(dim),
             _ => [0.0; 2],
         }
     }
@@ -199,6 +217,10 @@ impl Operator {
     pub fn is_one_matrix(&self) -> bool {
         !matches!(self.tensor, Tensor::Twice { .. })
     }
+}
+
+fn sum<const N: usize>(parts: [[f64; 2]; N]) -> [f64; 2] {
+    [0, 1].map(|k| parts.iter().map(|part| part[k]).sum())
 }
 
 /// The operator of this name, whatever its case.

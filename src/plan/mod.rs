@@ -10,6 +10,7 @@ pub mod motion;
 pub mod preconditioner;
 pub mod prepare;
 pub mod report;
+mod room;
 pub mod rules;
 pub mod run;
 pub mod state;
@@ -88,21 +89,22 @@ impl Plan {
         }
         let evaluations =
             if self.leaves_out(&rules::SAME_H) { "one kernel evaluation" } else { "two kernel evaluations" };
+        let [kept_pair, kept] = choices.operator.bytes();
         add(
             "weights",
             setup,
-            pairs * 12.0 + 4.0 * n,
+            pairs * kept_pair + n * kept,
             pairs,
             format!("{} w_ab, {evaluations} per pair", facts.operator),
         );
-        let [pair, particle] = choices.operator.bytes_to_make(facts.dim);
+        let [pair, particle] = choices.operator.bytes_to_project(facts.dim);
         if pair > 0.0 {
             let left = facts.defect.map_or(String::new(), |d| format!("; conduction_defect {d:.1e}"));
             let about = format!("moments of a Laplacian for all at once; memory for as long as it takes{left}");
             add("project", setup, pairs * pair + n * particle, 30.0 * pairs, about);
         }
         let normalise = choices.normalise;
-        if normalise != Normalise::No && pair == 0.0 {
+        if normalise != Normalise::No && !choices.operator.is_projected() {
             add("normalise", setup, n * normalise.bytes(facts.dim), pairs, normalise.about().into());
         }
         if self.leaves_out(&rules::FROZEN) && !self.leaves_out(&rules::UNIFORM_KAPPA) {

@@ -47,6 +47,9 @@ impl State {
     /// # Errors
     /// `OutOfOrder` naming what is missing, `BoxTooSmall`, `NoMemory`, `BadElement` naming a particle.
     pub fn prepare(&mut self, call: &str) -> Result<Plan> {
+        if self.geometry.is_none() {
+            self.refuse_weights_without_room(self.fewest_neighbours())?;
+        }
         let plan = self.prepare_fresh(call)?;
         self.prepare_weights(&plan)?;
         self.fold_kappa(&plan)?;
@@ -325,7 +328,7 @@ impl State {
         if self.weights.is_some() {
             return Ok(());
         }
-        self.refuse_what_does_not_fit()?;
+        self.refuse_weights_without_room(self.geometry.as_ref().map_or(0.0, |g| g.neighbours))?;
         let start = std::time::Instant::now();
         let same_h = plan.leaves_out(&rules::SAME_H);
         let (matrix, moments, (defect, paired), made) = self.with_assembly(same_h, |a| {
@@ -422,18 +425,6 @@ impl State {
         let omega = self.with_rows(|rows| density::omega(&self.choices.kernel, rows, mass, &self.pool))?;
         let rho = self.geometry.as_ref().map_or(&[][..], |g| &g.rho);
         memory::collected("densities", omega.iter().zip(rho).map(|(omega, rho)| 1.0 / (omega * rho)))
-    }
-
-    fn refuse_what_does_not_fit(&self) -> Result<()> {
-        let neighbours = self.geometry.as_ref().map_or(0.0, |g| g.neighbours);
-        let [pair, particle] = self.choices.operator.bytes_to_make(self.choices.kernel.dim());
-        let bytes = ((neighbours * (12.0 + pair) + particle) * self.len() as f64) as u64;
-        let available = self.choices.memory.unwrap_or_else(memory::available);
-        if bytes <= available {
-            return Ok(());
-        }
-        let what = format!("weights of {neighbours:.0} neighbours for each of {} particles", self.len());
-        Err(Error::NoMemory { what, bytes, available })
     }
 
     fn fold_kappa(&mut self, plan: &Plan) -> Result<()> {

@@ -51,6 +51,9 @@ impl State {
         if !(dt >= 0.0 && dt.is_finite()) {
             return Err(Error::bad("dt", dt, "a step must be finite and not negative"));
         }
+        if !(self.time + dt).is_finite() {
+            return Err(Error::bad("dt", dt, &format!("the time would be beyond all numbers after {:e}", self.time)));
+        }
         let start = Instant::now();
         self.set_anew()?;
         let mut plan = self.prepare("step")?;

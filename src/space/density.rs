@@ -319,6 +319,7 @@ fn solve_open(kernel: &Kernel, target: f64, rows: &Rows, weigh: Weigh, pool: &Po
             |row| {
                 let found = count.solve(kernel, weigh, &row, (target, rows.h[row.i]));
                 part[row.i - start] = found.unwrap_or(0.0);
+                Ok(())
             },
         );
         if let (Err(e), Ok(mut slot)) = (done, failed.lock()) {

@@ -54,8 +54,13 @@ impl<'a> Rows<'a> {
     /// Calls `visit` with the row of every particle in `range`, in order.
     ///
     /// # Errors
-    /// `NoMemory`; `Cancelled`.
-    pub fn visit(&self, range: Range<usize>, scratch: &mut Scratch, visit: impl FnMut(Row)) -> Result<()> {
+    /// The first of `visit`'s, which ends it; `NoMemory`; `Cancelled`.
+    pub fn visit(
+        &self,
+        range: Range<usize>,
+        scratch: &mut Scratch,
+        visit: impl FnMut(Row) -> Result<()>,
+    ) -> Result<()> {
         self.visit_where(range, scratch, |_| true, visit)
     }
 
@@ -65,7 +70,7 @@ impl<'a> Rows<'a> {
         range: Range<usize>,
         scratch: &mut Scratch,
         wanted: impl Fn(usize) -> bool,
-        visit: impl FnMut(Row),
+        visit: impl FnMut(Row) -> Result<()>,
     ) -> Result<()> {
         if self.cancel.load(Ordering::Relaxed) {
             return Err(Error::Cancelled);
@@ -87,16 +92,13 @@ impl<'a> Rows<'a> {
     ) -> Result<()> {
         let failed = std::sync::Mutex::new(None);
         pool.chunks(out, BLOCK, |start, part| {
-            let (mut buffers, mut inner) = (B::default(), Ok(()));
-            let range = start..start + part.len();
+            let (mut buffers, range) = (B::default(), start..start + part.len());
             let done = self.visit(range, &mut Scratch::default(), |row| {
                 let at = row.i - start;
-                match f(&mut buffers, row) {
-                    Ok(value) => part[at] = value,
-                    Err(e) => inner = Err(e),
-                }
+                part[at] = f(&mut buffers, row)?;
+                Ok(())
             });
-            if let (Err(e), Ok(mut slot)) = (done.and(inner), failed.lock()) {
+            if let (Err(e), Ok(mut slot)) = (done, failed.lock()) {
                 *slot = Some(e);
             }
         });
@@ -112,7 +114,11 @@ impl<'a> Rows<'a> {
             let start = sampled[k] * BLOCK;
             let range = start..(start + BLOCK / 8).min(self.cloud.len());
             let (mut pairs, rows) = (0u64, range.len() as u64);
-            self.visit(range, &mut Scratch::default(), |row| pairs += row.len() as u64).map(|()| (pairs, rows))
+            self.visit(range, &mut Scratch::default(), |row| {
+                pairs += row.len() as u64;
+                Ok(())
+            })?;
+            Ok((pairs, rows))
         });
         let (mut pairs, mut rows) = (0, 0);
         for count in counts {
@@ -127,7 +133,7 @@ impl<'a> Rows<'a> {
         range: Range<usize>,
         s: &mut Scratch,
         wanted: impl Fn(usize) -> bool,
-        mut visit: impl FnMut(Row),
+        mut visit: impl FnMut(Row) -> Result<()>,
     ) -> Result<()> {
         let group_of = |i: usize| self.cells.group_key(self.cloud, i, self.h[i]);
         let mut start = range.start;
@@ -140,7 +146,7 @@ impl<'a> Rows<'a> {
                 let first = s.place(start, end - start)?;
                 for i in (start..end).filter(|&i| wanted(i)) {
                     let centre: [f64; D] = std::array::from_fn(|a| self.cloud.x[a][i]);
-                    visit(s.near(i, first + (i - start), centre, self.radius * self.h[i], shifted)?);
+                    visit(s.near(i, first + (i - start), centre, self.radius * self.h[i], shifted)?)?;
                 }
             }
             start = end;
@@ -274,6 +280,7 @@ mod tests {
             got.sort_unstable();
             assert_eq!(got, brute_force(cloud, h, 2.0, row.i), "{what} row {}", row.i);
             pairs += got.len();
+            Ok(())
         });
         all.unwrap_or_else(|e| panic!("{what}: {e}"));
         assert!(pairs > 0);
@@ -353,7 +360,11 @@ mod tests {
         let cloud = Cloud::sort(&Domain::open(1), Strided::packed(&x), 0.2, &pool).unwrap();
         let rows = Rows::new(&cloud, &[0.1; 6], 2.0, &pool).unwrap();
         let mut counts = [0; 6];
-        rows.visit(0..6, &mut Scratch::default(), |row| counts[cloud.host[row.i] as usize] = row.len()).unwrap();
+        rows.visit(0..6, &mut Scratch::default(), |row| {
+            counts[cloud.host[row.i] as usize] = row.len();
+            Ok(())
+        })
+        .unwrap();
         assert_eq!(counts, [2, 2, 2, 1, 1, 0]);
     }
 
@@ -369,7 +380,11 @@ mod tests {
         let collect = |cuts: &[usize]| {
             let mut all: Vec<Vec<u32>> = Vec::new();
             for w in cuts.windows(2) {
-                rows.visit(w[0]..w[1], &mut Scratch::default(), |row| all.push(row.j.to_vec())).unwrap();
+                rows.visit(w[0]..w[1], &mut Scratch::default(), |row| {
+                    all.push(row.j.to_vec());
+                    Ok(())
+                })
+                .unwrap();
             }
             all
         };

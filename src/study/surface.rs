@@ -54,8 +54,10 @@ fn near(domain: &Domain, x: &[f64], spacing: &[f64], mut visit: impl FnMut(&Row,
     let cloud = Cloud::sort(domain, Strided::new("x", x, n, dim, dim)?, most, &pool)?;
     let reach = memory::collected("reach", cloud.host.iter().map(|&host| REACH * spacing[host as usize]))?;
     let rows = Rows::new(&cloud, &reach, 1.0, &pool)?;
-    rows.visit(0..n, &mut Scratch::default(), |row| visit(&row, &cloud.host, reach[row.i]))?;
-    Ok(())
+    rows.visit(0..n, &mut Scratch::default(), |row| {
+        visit(&row, &cloud.host, reach[row.i]);
+        Ok(())
+    })
 }
 
 #[cfg(test)]

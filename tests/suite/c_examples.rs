@@ -74,13 +74,43 @@ fn by_cmake() {
     assert!(told.contains("100% tests passed, 0 tests failed out of 7"), "{told}");
 }
 
+fn link_beside_another_rust(prefix: &Path, folder: &Path) {
+    let other = "#[unsafe(no_mangle)] pub extern \"C\" fn other_work(n: usize) -> usize {\n    let many: std::collections::HashMap<usize, \
+                 String> = (0..n).map(|i| (i, format!(\"{i}\"))).collect();\n    std::thread::spawn(move || many.len()).join().unwrap()\n}\n";
+    let host = "#include <diffusph.h>\n#include <stdio.h>\nsize_t other_work(size_t);\nint main(void) {\n    diffusph_solver *s;\n    \
+                char why[99];\n    int code = diffusph_create(\"heat dim=1 threads=2\", &s, why, sizeof why);\n    \
+                printf(\"%d %d %d\\n\", code, (int)other_work(10), diffusph_destroy(s));\n    return 0;\n}\n";
+    std::fs::write(folder.join("other.rs"), other).unwrap();
+    std::fs::write(folder.join("host.c"), host).unwrap();
+    let rustc = |options: &[&str]| {
+        let mut rustc = Command::new("rustc");
+        succeed(
+            rustc
+                .args(["--edition=2024", "--crate-type=staticlib", "-O"])
+                .args(options)
+                .arg("other.rs")
+                .current_dir(folder),
+        );
+    };
+    let ours = prefix.join("lib/libdiffusph.a");
+    for options in [&[][..], &["-Cpanic=abort"], &["-Clto=fat", "-Ccodegen-units=1"]] {
+        rustc(options);
+        for order in [[ours.as_path(), Path::new("libother.a")], [Path::new("libother.a"), ours.as_path()]] {
+            let mut gcc = Command::new("gcc");
+            gcc.arg("-I").arg(prefix.join("include")).arg("host.c").args(order).args(["-lm", "-o", "host"]);
+            succeed(gcc.current_dir(folder));
+            assert_eq!(succeed(&mut Command::new(folder.join("host"))), "0 10 0\n", "{options:?} {order:?}");
+        }
+    }
+}
+
 #[test]
 fn the_installed_library_is_like_any_other() {
     let dir = tempfile::tempdir().unwrap();
     let prefix = installed(dir.path());
     let file = |name: &str| prefix.join("lib").join(name);
     let dynamic = succeed(Command::new("readelf").arg("-d").arg(file("libdiffusph.so")));
-    assert!(dynamic.contains("Library soname: [libdiffusph.so.0]"), "{dynamic}");
+    assert!(dynamic.contains("Library soname: [libdiffusph.so.1]"), "{dynamic}");
     // It exports what the header has, and nothing else.
     let exported = succeed(Command::new("nm").args(["-D", "--defined-only"]).arg(file("libdiffusph.so")));
     let mut exported: Vec<&str> = exported.lines().filter_map(|l| l.split_whitespace().nth(2)).collect();
@@ -88,6 +118,15 @@ fn the_installed_library_is_like_any_other() {
     exported.sort_unstable();
     functions.sort_unstable();
     assert_eq!(exported, functions);
+    // So does the archive, and it links beside another library with a Rust of its own, whichever comes first.
+    let symbols = succeed(Command::new("readelf").arg("-sW").arg(file("libdiffusph.a")));
+    let mut kept: Vec<&str> = Vec::new();
+    for symbol in symbols.lines().filter(|l| l.contains(" GLOBAL ") && !l.contains(" UND ")) {
+        kept.extend(symbol.split_whitespace().last());
+    }
+    kept.sort_unstable();
+    assert_eq!(kept, functions);
+    link_beside_another_rust(&prefix, dir.path());
     // A version that we do not have is refused.
     for (wanted, found) in [("0.1", true), ("0.1.0", true), ("0", true), ("0.2", false), ("1", false)] {
         let project = dir.path().join(format!("project-{wanted}"));

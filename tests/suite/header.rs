@@ -34,7 +34,12 @@ fn for_c_readers(text: &str) -> String {
             lines.push(line);
         }
     }
-    lines.join("\n").trim_start().to_string() + "\n"
+    // C89 has no comments to the end of a line.
+    let line = |line: &str| match line.split_once("// ").filter(|_| line.starts_with(['#', '}'])) {
+        Some((code, why)) => format!("{} /* {why} */", code.trim_end()),
+        None => line.into(),
+    };
+    lines.into_iter().map(line).collect::<Vec<String>>().join("\n").trim_start().to_string() + "\n"
 }
 
 #[test]
@@ -59,13 +64,13 @@ fn user_of_everything() -> String {
         text += &format!("    sum += {name};\n");
     }
     for function in header::functions() {
-        text += &format!("    sum += {} != NULL;\n", function.name);
+        text += &format!("    sum += ({} != NULL);\n", function.name);
     }
     text + "    printf(\"%lld\\n\", sum);\n    return 0;\n}\n"
 }
 
 fn compile(compiler: &str, dialect: &str, source: &Path, more: &[&str]) -> std::process::Output {
-    let strict = ["-Wall", "-Wextra", "-Werror", "-pedantic", "-Wno-address"];
+    let strict = ["-Wall", "-Wextra", "-Wundef", "-Werror", "-Wno-address"];
     let mut command = Command::new(compiler);
     command.arg(format!("-std={dialect}")).args(strict).args(more).arg("-fsyntax-only");
     run(command.arg("-I").arg(root().join("include")).arg(source))
@@ -82,13 +87,31 @@ fn c_and_cpp_compilers_accept_it() {
     let (c, cpp) = (file("all.c", &user_of_everything()), file("all.cpp", &user_of_everything()));
     // A control: a missing macro must be noticed by the same flags.
     let wrong = file("wrong.c", &user_of_everything().replace("DIFFUSPH_BUSY", "DIFFUSPH_BUSSY"));
-    for dialect in ["c99", "c11", "c17"] {
-        let done = compile("gcc", dialect, &c, &["-Wstrict-prototypes"]);
+    let in_c: &[&str] = &["-pedantic", "-Wstrict-prototypes", "-Wconversion", "-Wsign-conversion"];
+    // Hosts of the oldest C have stdint.h, and long long from it.
+    for (dialect, more) in
+        [("c89", &["-Wno-long-long"][..]), ("gnu89", in_c), ("c99", in_c), ("c11", in_c), ("c2x", in_c)]
+    {
+        let plain =
+            user_of_everything().replace("long long", "int64_t").replace("%lld", "%ld").replace("+= ", "+= (int64_t)");
+        let c = if dialect.ends_with("89") { file("old.c", &plain) } else { c.clone() };
+        let done = compile("gcc", dialect, &c, more);
         assert!(done.status.success(), "{dialect}: {}", String::from_utf8_lossy(&done.stderr));
-        assert!(!compile("gcc", dialect, &wrong, &["-Wstrict-prototypes"]).status.success());
+        assert!(!compile("gcc", dialect, &wrong, more).status.success());
     }
-    for dialect in ["c++11", "c++17"] {
-        let done = compile("g++", dialect, &cpp, &[]);
+    for dialect in ["c++98", "c++11", "c++17", "c++20"] {
+        let more: &[&str] = &["-Wold-style-cast", "-Wconversion", "-Wzero-as-null-pointer-constant"];
+        // The program casts and compares with NULL in its own way; the header must not.
+        let source = file(
+            "host.cpp",
+            "#include <diffusph.h>\nint main() {\n    diffusph_report r = DIFFUSPH_REPORT_INIT;\n    return static_cast<int>(r.stages);\n}\n",
+        );
+        let done = compile("g++", dialect, &source, more);
+        assert!(done.status.success(), "{dialect}: {}", String::from_utf8_lossy(&done.stderr));
+        if dialect == "c++98" {
+            continue;
+        }
+        let done = compile("g++", dialect, &cpp, &["-pedantic"]);
         assert!(done.status.success(), "{dialect}: {}", String::from_utf8_lossy(&done.stderr));
     }
 }

@@ -352,6 +352,40 @@ fn what_making_weights_takes_counts_too() {
 }
 
 #[test]
+fn what_is_hopeless_is_refused_before_it_is_searched() {
+    let x = lattice(40, 3, 0.2);
+    for h in [None, Some(0.03)] {
+        let mut s = unit_box("kernel=M6 memory=1e6", &x, 3, true);
+        s.set_number("T", 1.0).unwrap();
+        h.iter().for_each(|h| s.set_number("h", *h).unwrap());
+        assert_eq!(s.step(1e-6).unwrap_err().name(), "NO_MEMORY");
+        assert_eq!((s.runs("density"), s.runs("sort"), s.runs("weights")), (0, 0, 0));
+        // A density needs no weights.
+        s.get_all("rho").unwrap();
+    }
+}
+
+#[test]
+fn setting_up_can_be_cancelled() {
+    use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+    let x = lattice(30, 3, 0.2);
+    let mut s = unit_box("kernel=M6 threads=2", &x, 3, true);
+    s.set_number("T", 1.0).unwrap();
+    let (cancel, done) = (s.canceller(), AtomicBool::new(false));
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while !done.load(Relaxed) {
+                cancel.store(true, Relaxed);
+            }
+        });
+        let e = s.step(1e-6).unwrap_err();
+        done.store(true, Relaxed);
+        assert!(e.name() == "CANCELLED" && s.runs("weights") == 0, "{e}");
+    });
+    s.step(1e-6).unwrap();
+}
+
+#[test]
 fn density_follows_moving_particles() {
     // The lengths found last are a start, not an answer: after a move the answer is that of a new solver.
     let x = lattice(12, 3, 0.3);

@@ -17,6 +17,7 @@ mod given;
 mod header;
 mod implicit;
 mod laws;
+mod memory;
 mod multigrid;
 mod nonlinear;
 #[cfg(feature = "cli")]

@@ -39,6 +39,10 @@ struct Slope {
     mate: f64,
 }
 
+/// Bytes that it takes beside the weights, for each pair and for each particle.
+pub const BYTES: [f64; 2] =
+    [size_of::<Slope>() as f64, (size_of::<Matrix3<f64>>() + size_of::<Sym>() + size_of::<f64>()) as f64];
+
 /// The stored two-sweep operator, over the pairs of a [`Matrix`] of weights.
 pub struct Twice {
     slopes: Vec<Vec<Slope>>,
@@ -272,12 +276,9 @@ fn block(assembly: &Assembly, recipe: &Recipe, scratch: &mut Scratch, b: usize) 
     let (mut slopes, mut start) = (Vec::new(), memory::reserved("rows", range.len() + 1)?);
     let mut frames = memory::reserved("frames", range.len())?;
     let (mut q, mut own, mut mate) = (Vec::new(), Vec::new(), Vec::new());
-    let mut failed = Ok(());
     start.push(0);
     assembly.rows.visit(range, scratch, |row| {
-        if let Err(e) = memory::room("slopes", &mut slopes, row.len()) {
-            return failed = Err(e);
-        }
+        memory::room("slopes", &mut slopes, row.len())?;
         let h = assembly.rows.h;
         fill(assembly, &row, |_| h[row.i], &mut q, &mut own);
         fill(assembly, &row, |j| h[j], &mut q, &mut mate);
@@ -291,8 +292,8 @@ fn block(assembly: &Assembly, recipe: &Recipe, scratch: &mut Scratch, b: usize) 
             Some(plain) => Matrix3::identity() * plain[row.i],
             None => frame(&slopes[first..]),
         });
+        Ok(())
     })?;
-    failed?;
     Ok((slopes, start, frames))
 }
 

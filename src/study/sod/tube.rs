@@ -158,6 +158,7 @@ impl Tube {
         rows.visit(0..count, &mut Scratch::default(), |row| {
             let a = cloud.host[row.i] as usize;
             du[a] = self.pull(a, &row, &cloud.host, &mut slopes, &mut dv[a * dim..][..dim]);
+            Ok(())
         })?;
         Ok((dv, du))
     }
