@@ -52,7 +52,7 @@ module diffusph
 
     ! What a step did. The size is right from the start: leave it.
     type, bind(c) :: diffusph_report
-        integer(c_int64_t) :: size = 14 * 8
+        integer(c_int64_t) :: size = 17 * 8
         real(c_double) :: time = 0          ! reached, s
         real(c_double) :: dt = 0            ! the step, s
         integer(c_int64_t) :: substeps = 0
@@ -66,6 +66,9 @@ module diffusph
         real(c_double) :: seconds = 0       ! of wall-clock time
         integer(c_int64_t) :: rejected = 0  ! sub-steps done again, shorter, for the tolerance
         integer(c_int64_t) :: iterations = 0 ! of conjugate gradients, of implicit integrators
+        real(c_double) :: heat_source = 0   ! that sources brought in, J
+        real(c_double) :: heat_surface = 0  ! through surfaces
+        real(c_double) :: heat_fixed = 0    ! from particles of fixed T
     end type
 
     ! What callbacks look like. Particles are numbered from 0.

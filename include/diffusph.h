@@ -45,7 +45,7 @@
 #include <stdint.h>
 
 /* The start of every report. */
-#define DIFFUSPH_REPORT_INIT {sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
+#define DIFFUSPH_REPORT_INIT {sizeof(diffusph_report), 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0}
 
 /**
  * Done.
@@ -281,6 +281,18 @@ typedef struct diffusph_report {
    * Iterations of conjugate gradients, of implicit integrators.
    */
   int64_t iterations;
+  /**
+   * Heat that sources brought in, J.
+   */
+  double heat_source;
+  /**
+   * Heat that came in through surfaces (flux_in, h_conv, emissivity), J.
+   */
+  double heat_surface;
+  /**
+   * Heat that came in from particles of fixed T, J; with the two above it makes up energy - energy_before.
+   */
+  double heat_fixed;
 } diffusph_report;
 
 #ifdef __cplusplus

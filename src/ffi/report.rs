@@ -37,6 +37,12 @@ pub struct Report {
     pub rejected: i64,
     /// Iterations of conjugate gradients, of implicit integrators.
     pub iterations: i64,
+    /// Heat that sources brought in, J.
+    pub heat_source: f64,
+    /// Heat that came in through surfaces (flux_in, h_conv, emissivity), J.
+    pub heat_surface: f64,
+    /// Heat that came in from particles of fixed T, J; with the two above it makes up energy - energy_before.
+    pub heat_fixed: f64,
 }
 
 impl From<plan::Report> for Report {
@@ -57,6 +63,9 @@ impl From<plan::Report> for Report {
             seconds: r.seconds,
             rejected: count(r.rejected),
             iterations: count(r.iterations),
+            heat_source: r.heat_source,
+            heat_surface: r.heat_surface,
+            heat_fixed: r.heat_fixed,
         }
     }
 }

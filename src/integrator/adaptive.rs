@@ -7,7 +7,7 @@
 //! kept (Hairer, Nørsett & Wanner, Solving ODEs I, II.4): implicit methods damp what is too stiff to be resolved, and
 //! such an estimate does too.
 
-use super::{Family, Method, Range, Schedule, System, Work};
+use super::{Family, Method, Range, Schedule, System, Tally, Work, tallied};
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::Pool;
@@ -69,6 +69,8 @@ pub struct Adaptive<'a> {
     pub rejected: u64,
     /// How far the sub-steps may be from the solutions of their equations, in sum.
     pub slack: f64,
+    /// What the sub-steps have added to what is tallied.
+    pub tally: Tally,
 }
 
 impl<'a> Adaptive<'a> {
@@ -111,6 +113,7 @@ impl<'a> Adaptive<'a> {
             last,
             rejected,
             slack,
+            tally: Tally::default(),
         })
     }
 
@@ -167,6 +170,7 @@ impl<'a> Adaptive<'a> {
                 std::mem::swap(&mut self.rate, &mut self.other);
             }
             self.slack += work.slack;
+            tallied(&mut self.tally, 1.0, work.tally);
             self.last = Some(error);
             self.failure.iter_mut().for_each(|(most, _)| *most = most.max(RECOVERY * dt));
         } else {
@@ -232,12 +236,13 @@ impl<'a> Adaptive<'a> {
         let Some(scale) = method.trapezoidal() else {
             let half = Schedule { dt: 0.5 * dt, ..*schedule };
             method.advance(&half, system, pool, t, &mut self.trial, work)?;
-            let slack = work.slack;
+            let (slack, mut tally) = (work.slack, work.tally);
             method.advance(&half, system, pool, t + half.dt, &mut self.trial, work)?;
             let slack = slack + work.slack;
+            tallied(&mut tally, 1.0, work.tally);
             self.other.copy_from_slice(y);
             method.advance(schedule, system, pool, t, &mut self.other, work)?;
-            work.slack = slack;
+            (work.slack, work.tally) = (slack, tally);
             let share = 1.0 / (2f64.powi(method.order as i32) - 1.0);
             return Ok(self.measure(|i| share * (self.trial[i] - self.other[i])));
         };

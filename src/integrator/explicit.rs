@@ -1,6 +1,6 @@
 //! Explicit Runge-Kutta methods: Butcher's tables, and one loop for all of them.
 
-use super::{System, Work};
+use super::{System, Tally, Work, tallied};
 use crate::error::Result;
 use crate::pool::Pool;
 
@@ -46,12 +46,14 @@ impl Tableau {
         y: &mut [f64],
         work: &mut Work,
     ) -> Result<()> {
+        let mut tally = Tally::default();
         let [stage, rates @ ..] = work.arrays::<5>(y.len())?;
         for (i, (a, c)) in self.a.iter().zip(self.c).enumerate() {
             let (known, rest) = rates.split_at_mut(i);
             let Some(rate) = rest.first_mut() else { break };
             if a.is_empty() {
                 system.rate(t, y, rate)?;
+                tallied(&mut tally, dt * self.b[i], system.tally());
                 continue;
             }
             pool.update(stage, |start, part| {
@@ -59,8 +61,10 @@ impl Tableau {
                 add(part, start, dt, a, known);
             });
             system.rate(t + c * dt, stage, rate)?;
+            tallied(&mut tally, dt * self.b[i], system.tally());
         }
         pool.update(y, |start, part| add(part, start, dt, self.b, rates));
+        work.tally = tally;
         Ok(())
     }
 }

@@ -7,7 +7,7 @@
 //! what is left lies between two iterates, and so within their bounds.
 
 use super::krylov::{Equations, Limits, add, unsolved};
-use super::{Linear, Schedule, Shifted, System, Work};
+use super::{Linear, Schedule, Shifted, System, Tally, Work, tallied};
 use crate::error::{Error, Result};
 use crate::pool::Pool;
 use crate::sum;
@@ -70,20 +70,21 @@ impl Tableau {
         let [base, stage, first, second, space @ ..] = work.arrays::<10>(y.len())?;
         let rates = [first, second];
         let (mut supplies, mut slack, mut iterations) = ([Some(0.0); 2], 0.0, 0);
+        let mut tallies = [Tally::default(); 2];
         stage.copy_from_slice(y);
         for (i, (a, c)) in self.a.iter().zip(self.c).enumerate() {
             let (time, g) = (t + c * dt, a[i] * dt);
             if g == 0.0 {
                 // An explicit stage, or a step too short for numbers.
                 system.rate(time, stage, rates[i])?;
-                supplies[i] = system.supply(time, stage)?;
+                (tallies[i], supplies[i]) = (system.tally(), system.supply(time, stage)?);
                 continue;
             }
             base.copy_from_slice(y);
             (0..i).for_each(|j| add(pool, base, dt * a[j], rates[j]));
             let (allowed, spent) = solve(system, pool, schedule.limits, (time, g), base, stage, space)?;
             (slack, iterations) = (allowed, iterations + spent);
-            supplies[i] = system.supply(time, stage)?;
+            (tallies[i], supplies[i]) = (system.tally(), system.supply(time, stage)?);
             let supplied = (0..=i).map(|j| Some(dt * a[j] * supplies[j]?)).sum::<Option<f64>>();
             if let Some(supplied) = supplied {
                 slack += conserve(pool, g, supplied, y, stage, space);
@@ -96,6 +97,10 @@ impl Tableau {
         y.copy_from_slice(stage);
         work.slack = slack;
         work.iterations += iterations;
+        // Stiffly accurate: the step is its last stage.
+        if let Some(weights) = self.a.last() {
+            weights.iter().zip(tallies).for_each(|(a, tally)| tallied(&mut work.tally, dt * a, tally));
+        }
         Ok(())
     }
 }

@@ -17,10 +17,24 @@ pub use krylov::Limits;
 pub use range::Range;
 use stabilised::Recursion;
 
+/// Quantities whose rates follow from those of y, and on which none depends.
+pub type Tally = [f64; 2];
+
+/// `to += factor * what`.
+pub(crate) fn tallied(to: &mut Tally, factor: f64, what: Tally) {
+    to.iter_mut().zip(what).for_each(|(to, what)| *to += factor * what);
+}
+
 /// What an integrator advances: dy/dt = rate(t, y).
 pub trait System {
     /// Writes the rate at (t, y) to `dy`, which has the length of `y` and holds nothing of use before.
     fn rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<()>;
+
+    /// How fast what is tallied beside y grows, by the rate evaluated last. It is integrated with the weights that rates
+    /// have, so that whatever law binds it to y holds for the step as well.
+    fn tally(&self) -> Tally {
+        Tally::default()
+    }
 
     /// For implicit methods: fixes a linear operator A with rate(t, y + d) ≈ rate(t, y) + A d, after a call of `rate`
     /// with the same arguments. Writes −diag A, and the weights of the inner product Σ weight x y in which A is
@@ -323,7 +337,7 @@ impl Method {
         y: &mut [f64],
         work: &mut Work,
     ) -> Result<()> {
-        work.slack = 0.0;
+        (work.slack, work.tally) = (0.0, Tally::default());
         match self.family {
             Family::Explicit(tableau) => tableau.advance(schedule.dt, system, pool, t, y, work),
             Family::Stabilised(recursion) => recursion.advance(schedule, system, pool, t, y, work),
@@ -375,6 +389,8 @@ pub struct Work {
     pub slack: f64,
     /// Iterations of conjugate gradients so far.
     pub iterations: u64,
+    /// What the last sub-step has added to what is tallied.
+    pub tally: Tally,
 }
 
 impl Work {

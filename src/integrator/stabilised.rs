@@ -2,7 +2,7 @@
 //! square of their number (Meyer, Balsara & Aslam, J. Comput. Phys. 257, 594, 2014). One loop; the methods are
 //! coefficients.
 
-use super::{Schedule, System, Work};
+use super::{Schedule, System, Tally, Work};
 use crate::error::Result;
 use crate::pool::Pool;
 
@@ -97,6 +97,9 @@ impl Recursion {
         });
         // Where a stage stands in time follows from the same recursion, in units of dt.
         let (mut time_before, mut time_last) = (0.0, first);
+        // So does what is tallied, from nothing.
+        let first_tally = system.tally();
+        let (mut tally_before, mut tally_last) = (Tally::default(), first_tally.map(|rate| dt * first * rate));
         for j in 2..=schedule.stages {
             let k = (self.stage)(s, f64::from(j));
             system.rate(t + time_last * dt, last, rate)?;
@@ -105,9 +108,13 @@ impl Recursion {
             });
             let time = k.mu * time_last + k.nu * time_before + k.mu_rate + k.gamma_rate;
             (time_before, time_last) = (time_last, time);
+            let mut tally = tally_before;
+            k.update(dt, &mut tally, [&[0.0; 2], &tally_last, &system.tally(), &first_tally]);
+            (tally_before, tally_last) = (tally_last, tally);
             std::mem::swap(before, last);
         }
         pool.update(y, |start, part| part.copy_from_slice(&last[start..start + part.len()]));
+        work.tally = tally_last;
         Ok(())
     }
 }

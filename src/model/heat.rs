@@ -57,7 +57,6 @@ pub struct Heat<'a> {
     pub host: &'a [u32],
     /// Skip blocks in which nothing differs.
     pub quiet: bool,
-    /// Set by the host from any thread to stop the step.
     /// What exchange with the outside and a source take from dT/dt per kelvin, 1/s, as last linearised; empty where there
     /// is none.
     pub slopes: Vec<f64>,
@@ -69,6 +68,16 @@ pub struct Heat<'a> {
     pub stiff: f64,
     /// Applications of the operator so far.
     pub applications: u64,
+    /// What a source and the surroundings brought in by the rate evaluated last, W; sources that are fields bring
+    /// the same always.
+    pub power: Power,
+}
+
+/// Heat that comes in per second, W; T is free where it does.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Power {
+    pub source: f64,
+    pub surface: f64,
 }
 
 impl Heat<'_> {
@@ -82,9 +91,19 @@ impl Heat<'_> {
         self.kappa_of_t(time, t)?;
         self.diffuse(t, rate)?;
         if let Some(surface) = self.surface {
-            surface.add(self.evaluated_kappa(), t, self.inverse_capacity, rate);
+            self.power.surface = surface.add(self.evaluated_kappa(), t, self.inverse_capacity, rate);
         }
-        self.release(time, t, rate)
+        self.release(time, t, rate)?;
+        if let Release::Host(_, source) = &self.release {
+            self.power.source = self.power_of(source);
+        }
+        Ok(())
+    }
+
+    /// What a source heats per second, W, where T is free.
+    pub fn power_of(&self, source: &[f64]) -> f64 {
+        let (volume, inverse) = (self.volume, self.inverse_capacity);
+        sum::sum(self.pool, source.len(), |i| if inverse[i] > 0.0 { source[i] * volume[i] } else { 0.0 })
     }
 
     /// Linearises the exchange with the outside and the source about these temperatures, for [`Heat::linear`]; answers the

@@ -6,6 +6,7 @@
 
 use crate::error::Result;
 use crate::memory;
+use crate::sum;
 
 /// Inputs of one particle, in the order of its row here.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -137,13 +138,16 @@ impl Surface {
         (low, high)
     }
 
-    /// rate_i += power_i / capacity_i; `inverse` holds 1/capacity, `kappa` kappa(T) where it depends on T.
-    pub fn add(&self, kappa: &[f64], t: &[f64], inverse: &[f64], rate: &mut [f64]) {
-        for (i, exchange) in &self.members {
+    /// rate_i += power_i / capacity_i; `inverse` holds 1/capacity, `kappa` kappa(T) where it depends on T. Answers the
+    /// power into all whose T is free, W.
+    pub fn add(&self, kappa: &[f64], t: &[f64], inverse: &[f64], rate: &mut [f64]) -> f64 {
+        sum::compensated(self.members.iter().map(|(i, exchange)| {
             let (i, given) = (i.particle as usize, i.kappa);
             let kappa = kappa.get(i).copied().unwrap_or(given);
-            rate[i] += exchange.power(self.sigma_sb, kappa, t[i]) * inverse[i];
-        }
+            let power = exchange.power(self.sigma_sb, kappa, t[i]);
+            rate[i] += power * inverse[i];
+            if inverse[i] > 0.0 { power } else { 0.0 }
+        }))
     }
 
     /// Calls `visit(i, slope)` with W/K for each particle here.

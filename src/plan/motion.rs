@@ -4,7 +4,9 @@ use super::report::{Report, Timers};
 use super::state::Progress;
 use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
-use crate::integrator::{self, Adaptive, Bounds, Control, Linear, Method, Range, Schedule, Shifted, System, Work};
+use crate::integrator::{
+    self, Adaptive, Bounds, Control, Linear, Method, Range, Schedule, Shifted, System, Tally, Work,
+};
 use crate::memory;
 use crate::model::heat::{self, Heat};
 use crate::operator::multigrid::Fine;
@@ -49,6 +51,10 @@ pub struct Known {
 impl System for Heat<'_> {
     fn rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<()> {
         Heat::rate(self, t, y, dy)
+    }
+
+    fn tally(&self) -> Tally {
+        [self.power.source, self.power.surface]
     }
 
     fn linearise(&mut self, t: f64, y: &[f64], diagonal: &mut [f64], weight: &mut [f64]) -> Result<Linear> {
@@ -142,6 +148,7 @@ impl Motion<'_> {
                 report.limit = explicit_limit(bounds);
                 if dt > WORTH_A_LOOK * report.limit && self.is_still(time, t)? {
                     report.substeps = 1;
+                    report.came_in(dt, self.heat.tally());
                     return self.tell(time, dt, dt);
                 }
             }
@@ -152,6 +159,7 @@ impl Motion<'_> {
                 let now = time + done + schedule.start(k);
                 self.choices.method.advance(&schedule, &mut self.heat, self.pool, now, t, self.work)?;
                 report.substeps += 1;
+                report.came_in(1.0, self.work.tally);
                 self.tell(time, dt, done + schedule.start(k + 1))?;
             }
             done = if steps == schedule.substeps { dt } else { done + schedule.start(steps) };
@@ -171,6 +179,7 @@ impl Motion<'_> {
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
         if pace.is_still() && self.heat.is_autonomous() {
             (report.substeps, report.stages) = (1, 1);
+            report.came_in(dt, self.heat.tally());
             return self.tell(time, dt, dt);
         }
         // Nothing makes a step possible that is too long for stability alone: it is refused before any work.
@@ -192,6 +201,7 @@ impl Motion<'_> {
             self.refuse_what_does_not_end(&pace, (dt, dt - done), self.heat.applications - before)?;
         }
         (report.rejected, self.work.slack) = (pace.rejected, pace.slack);
+        report.came_in(1.0, pace.tally);
         Ok(())
     }
 

@@ -8,7 +8,7 @@ use crate::error::{Error, Result};
 use crate::integrator::Range;
 use crate::memory;
 use crate::model::fields::{self, FIELDS, INPUTS, Slot};
-use crate::model::heat::{Conductivity, Heat, Release};
+use crate::model::heat::{Conductivity, Heat, Power, Release};
 use crate::model::surface::{Exchange, Surface};
 use crate::model::tensor::Tensor;
 use crate::operator::table::{self, OPERATORS, Tensor as Form};
@@ -547,7 +547,11 @@ impl State {
             multigrid: Some(&mut self.multigrid),
             stiff,
             applications: 0,
+            power: Power::default(),
         };
+        if let Release::Field(source) = heat.release {
+            heat.power.source = heat.power_of(source);
+        }
         if !(plan.leaves_out(&rules::KEEP_MATRIX) && heat.operator_is_fixed()) {
             heat.multigrid.iter_mut().for_each(|m| **m = Multigrid::default());
         }

@@ -1,5 +1,6 @@
 //! What a step did, and what it took.
 
+use crate::integrator::Tally;
 use std::time::{Duration, Instant};
 
 /// Of one step, and where the time went since the solver was created.
@@ -12,13 +13,20 @@ pub struct Report {
     pub stages: u64,
     /// Applications of the operator, those of the power iteration and of solvers included.
     pub applications: u64,
-    /// A stable explicit step, s, from the bounds that the step needed; `limit` finds the largest. after an implicit step what Gershgorin's circles prove, which is less.
+    /// A stable explicit step, s, from the bounds that the step needed; `limit` finds the largest. After an implicit step
+    /// what Gershgorin's circles prove, which is less.
     pub limit: f64,
     pub t_min: f64,
     pub t_max: f64,
     /// Σ m c_v T before and after, J.
     pub energy_before: f64,
     pub energy: f64,
+    /// By what heat came in, J, negative where it went out: sources, exchange at surfaces, and particles of fixed T with
+    /// their neighbours; where T is free, they add up to `energy` − `energy_before`. What an operator makes that does not
+    /// conserve counts with the last, where some T is fixed.
+    pub heat_source: f64,
+    pub heat_surface: f64,
+    pub heat_fixed: f64,
     pub seconds: f64,
     /// Sub-steps that were done again, shorter, for `tolerance`.
     pub rejected: u64,
@@ -26,6 +34,14 @@ pub struct Report {
     pub integrator: &'static str,
     /// Iterations of conjugate gradients, of implicit methods.
     pub iterations: u64,
+}
+
+impl Report {
+    /// Adds what sources and surfaces have brought in.
+    pub fn came_in(&mut self, factor: f64, [source, surface]: Tally) {
+        self.heat_source += factor * source;
+        self.heat_surface += factor * surface;
+    }
 }
 
 /// Seconds per pass and how often it ran, summed over the life of a solver.

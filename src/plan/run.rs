@@ -76,6 +76,10 @@ impl State {
         self.check(&plan, &before, &t)?;
         (report.t_min, report.t_max) = self.extrema(&t);
         report.energy = self.energy(&t);
+        if self.inputs[fields::FIXED] != Input::Number(0.0) {
+            let came_in = report.heat_source + report.heat_surface;
+            report.heat_fixed = report.energy - report.energy_before - came_in;
+        }
         let made = self.made_by(dt, &t, report.energy - report.energy_before)?;
         self.timers.add("check", checked.elapsed());
 

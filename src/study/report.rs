@@ -66,13 +66,38 @@ pub struct Energy {
     pub relative: f64,
     /// Nothing lets energy in or out: the change is an error.
     pub isolated: bool,
+    /// What came in, negative where it went out.
+    #[serde(flatten)]
+    pub heat: Heat,
+}
+
+/// By what heat came in, J.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+pub struct Heat {
+    #[serde(rename = "heat_source")]
+    pub source: f64,
+    #[serde(rename = "heat_surface")]
+    pub surface: f64,
+    #[serde(rename = "heat_fixed")]
+    pub fixed: f64,
+}
+
+impl Heat {
+    /// What came in at all, in words.
+    fn ways(&self) -> String {
+        let ways = [("sources", self.source), ("surfaces", self.surface), ("fixed T", self.fixed)];
+        let told = ways.iter().filter(|(_, heat)| *heat != 0.0);
+        told.map(|(way, heat)| format!("{} {} by {way}", if *heat > 0.0 { "+" } else { "-" }, Short(heat.abs())))
+            .collect::<Vec<_>>()
+            .join(" ")
+    }
 }
 
 impl Energy {
     /// `size` is Σ |m c_v T|.
-    pub fn new(before: f64, after: f64, size: f64, isolated: bool) -> Energy {
+    pub fn new(before: f64, after: f64, size: f64, isolated: bool, heat: Heat) -> Energy {
         let relative = if size > 0.0 { (after - before) / size } else { 0.0 };
-        Energy { before, after, relative, isolated }
+        Energy { before, after, relative, isolated, heat }
     }
 }
 
@@ -95,6 +120,8 @@ pub struct Work {
     /// In steps.
     #[serde(skip)]
     pub seconds: f64,
+    #[serde(skip)]
+    pub heat: Heat,
 }
 
 impl Work {
@@ -107,6 +134,9 @@ impl Work {
         self.stages = step.stages;
         self.applications += step.applications;
         self.seconds += step.seconds;
+        self.heat.source += step.heat_source;
+        self.heat.surface += step.heat_surface;
+        self.heat.fixed += step.heat_fixed;
     }
 }
 
@@ -154,13 +184,14 @@ impl fmt::Display for Report {
         if let Some(Accuracy { solution, l2, max, particles }) = &self.accuracy {
             row("error", format!("{l2:.2e} (l2), {max:.2e} (max) against '{solution}' at {particles} particles"))?;
         }
-        let Energy { before, after, relative, isolated } = self.energy;
+        let Energy { before, after, relative, isolated, heat } = self.energy;
         let (before, after) = (Short(before), Short(after));
         row(
             "energy",
             match isolated {
                 true => format!("{before}, kept to {:.1e}", relative.abs()),
-                false => format!("{before} became {after}; here it can enter and leave"),
+                false if heat == Heat::default() => format!("{before} became {after}; here it can enter and leave"),
+                false => format!("{before} {} became {after}", heat.ways()),
             },
         )?;
         let (was, is) = (self.temperature_before, self.temperature);
@@ -237,8 +268,10 @@ mod tests {
 
     #[test]
     fn energy_is_judged_against_its_size_not_its_sum() {
-        let wave = Energy::new(1e-18, -2e-18, 3.0, true);
+        let wave = Energy::new(1e-18, -2e-18, 3.0, true, Heat::default());
         assert!((wave.relative + 1e-18).abs() < 1e-30);
+        let heat = Heat { source: 2.5, surface: 0.0, fixed: -1.0 };
+        assert_eq!(heat.ways(), "+ 2.5 by sources - 1 by fixed T");
     }
 
     #[test]

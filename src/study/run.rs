@@ -122,7 +122,7 @@ impl Study {
             bytes: solver.get_number("bytes")?,
             time: solver.get_number("time")?,
             accuracy,
-            energy: Energy::new(energy, solver.get_number("energy")?, absolute_energy(solver)?, isolated),
+            energy: Energy::new(energy, solver.get_number("energy")?, absolute_energy(solver)?, isolated, work.heat),
             temperature_before: temperature,
             temperature: extrema(solver)?,
             ns_per_particle: seconds.per_application(&work, n),

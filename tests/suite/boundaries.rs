@@ -626,3 +626,43 @@ fn layers_that_pairs_reach_over_are_told_and_thick_bodies_in_contact_are_not() {
         assert!(!plan(quiet).0.contains("note: "), "{}", plan(quiet).0);
     }
 }
+
+/// Each way in alone is known, and together they make up what the energy has gained, whatever the method and the length
+/// of the step.
+#[test]
+fn the_report_says_by_what_heat_came_in() {
+    let x = lattice(12, 2, 0.0);
+    for integrator in ["euler", "ssprk3", "rk4", "rkl1", "rkl2", "backward-euler", "crank-nicolson", "sdirk2", "auto"] {
+        for (dt, tolerance) in [(1e-3, ""), (0.3, ""), (0.02, " tolerance=1e-4")] {
+            let mut s = unit_box(&format!("integrator={integrator}{tolerance}"), &x, 2, false);
+            let n = s.len();
+            s.set_number("T", 300.0).unwrap();
+            let column =
+                |from: f64| x.chunks(2).map(|p| f64::from(p[0] >= from && p[0] < from + 0.1)).collect::<Vec<_>>();
+            let set = |s: &mut Solver, name: &str, values: &[f64]| {
+                s.set(name, Strided::new(name, values, n, 1, 1).unwrap()).unwrap();
+            };
+            set(&mut s, "source", &column(0.4).iter().map(|c| 50.0 * c).collect::<Vec<_>>());
+            set(&mut s, "h_conv", &column(0.0).iter().map(|c| 3.0 * c).collect::<Vec<_>>());
+            set(&mut s, "area", &vec![1.0 / 12.0; n]);
+            s.set_number("T_ambient", 290.0).unwrap();
+            let power: f64 = 50.0 / 144.0 * column(0.4).iter().sum::<f64>();
+            let case = format!("{integrator} {dt}{tolerance}");
+            let r = s.step(dt).unwrap();
+            let gained = r.energy - r.energy_before;
+            // What is added up in single sub-steps, and what is left of two energies of 300 J.
+            let rounding = 1e-11 * r.energy;
+            assert!((r.heat_source - power * dt).abs() < rounding, "{case}: {} {}", r.heat_source, power * dt);
+            assert!(r.heat_surface < -rounding && r.heat_fixed == 0.0, "{case}: {r:?}");
+            assert!((gained - r.heat_source - r.heat_surface).abs() < 300.0 * rounding, "{case}: {gained} {r:?}");
+            // A wall at the other end takes the rest.
+            set(&mut s, "fixed", &column(0.9));
+            let r = s.step(dt).unwrap();
+            let rest = (r.energy - r.energy_before) - r.heat_source - r.heat_surface;
+            assert!(
+                (r.heat_fixed - rest).abs() < rounding && (dt < 0.3 || r.heat_fixed.abs() > 1e6 * rounding),
+                "{case}: {r:?}"
+            );
+        }
+    }
+}
