@@ -21,6 +21,9 @@
  *   Different solvers do not know of each other: there is no global state.
  * - Worker threads belong to the solver. In a host with OpenMP, OMP_WAIT_POLICY=passive keeps the host's idle threads
  *   from competing with them.
+ * - Hosts that share space among processes call diffusph_rate on their own particles and ghosts around them, as many
+ *   supports (kernel radius times h) as diffusph_get_number("ghost_supports") says, and step themselves: diffusph_step
+ *   takes ghosts for particles of its own.
  * - The library prints nothing, installs no signal handler, and does not end the process.
  * - Memory that the system refuses is answered with NO_MEMORY. Two things cannot be: threads that start with some hundred
  *   bytes missing end the process (diffusph_create, except with threads=1), and a system that promises more memory than

@@ -20,7 +20,7 @@ use std::process::ExitCode;
 /// Diffusion on SPH particles: runs scenes, shows what a run will do, lists what can be chosen, looks into files.
 #[derive(Parser)]
 #[command(name = "diffusph", version, arg_required_else_help = true)]
-#[command(after_help = "Start with 'diffusph run': it needs no file, and leaves a series for ParaView.")]
+#[command(after_help = EXIT_CODES)]
 struct Program {
     #[command(subcommand)]
     command: Command,
@@ -135,6 +135,11 @@ fn print(text: String) -> Result<()> {
         _ => Ok(()),
     }
 }
+
+/// What [`exit_code`] and studies answer; clap has 2 for arguments as well.
+const EXIT_CODES: &str = "Exit codes: 0 done; 1 a step, a file or a study went wrong; 2 what was asked for is wrong or incomplete; 130 interrupted.
+
+Start with 'diffusph run': it needs no file, and leaves a series for ParaView.";
 
 fn exit_code(error: &Error) -> u8 {
     match error {

@@ -35,6 +35,11 @@ pub struct StudyArgs {
 /// `UnknownWord`, `Io`, `Cancelled`, and what the study itself answers.
 pub fn run(args: &StudyArgs) -> Result<ExitCode> {
     let study = catalogue::find(&args.name)?;
+    if let Some(scene) = args.scene.as_ref().filter(|_| !study.takes_scene) {
+        let own = catalogue::STUDIES.iter().filter(|s| s.takes_scene).map(|s| s.name).collect::<Vec<_>>().join(", ");
+        let rule = format!("the study '{}' has its own particles; a scene is for {own}", study.name);
+        return Err(Error::bad("--scene", scene.display(), &rule));
+    }
     interrupt::listen();
     if let Some(folder) = &args.out {
         // Before the work, which may take minutes.

@@ -215,6 +215,11 @@ pub static NUMBERS: &[Number] = &[
     ),
     result("growth_rate", "1/s", "largest real part in the operator's spectrum (Arnoldi): above 0 where a mode grows"),
     result("lowered_orders", "-", "particles whose consistent weights have a lower order than was asked for"),
+    result(
+        "ghost_supports",
+        "-",
+        "how many supports of ghosts around a part of the particles make `rate` there that of the whole, ghosts being given all that the others are; infinite where weights depend on all particles",
+    ),
     result("bytes", "bytes", "memory held for particles and weights"),
     result("threads", "-", "worker threads"),
 ];

@@ -190,6 +190,18 @@ impl Operator {
         weighs && self.is_one_matrix()
     }
 
+    /// Over how many supports the rate of a particle reaches, densities being known; `None` where weights are made for all
+    /// particles at once.
+    pub fn supports(&self, normalise: Normalise) -> Option<u32> {
+        match self.tensor {
+            Tensor::Projected | Tensor::Stencils | Tensor::Twice { limited: true } => None,
+            // The flux of a neighbour takes the gradient of all its neighbours, and theirs its frame.
+            Tensor::Twice { limited: false } => Some(3),
+            Tensor::Scalar | Tensor::Angular(_) if normalise != Normalise::No => Some(2),
+            _ => Some(1),
+        }
+    }
+
     /// Whether its weights are projected, which normalises them.
     pub fn is_projected(&self) -> bool {
         matches!(self.tensor, Tensor::Projected | Tensor::Stencils)

@@ -346,6 +346,14 @@ impl State {
         self.law.is_some() || self.kappa_host.is_some()
     }
 
+    /// How many supports around a particle its rate depends on.
+    pub fn ghost_supports(&self) -> f64 {
+        let of_weights = self.choices.operator.supports(self.choices.normalise).map_or(f64::INFINITY, f64::from);
+        // A density is a sum over neighbours, and so is what is completed behind a wall.
+        let summed = f64::from(self.inputs[fields::RHO] == Input::Unset);
+        of_weights + summed + f64::from(self.has_walls())
+    }
+
     /// Of kappa between two particles.
     pub fn mean(&self) -> Mean {
         self.choices.mean(self.kappa_of_t())

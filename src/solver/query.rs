@@ -118,6 +118,7 @@ impl Solver {
                 let asked = if consistent { state.choices.order.into() } else { 0.0 };
                 orders(state)?.into_iter().filter(|&order| order < asked).count() as f64
             }
+            "ghost_supports" => state.ghost_supports(),
             "bytes" => state.bytes() as f64,
             _ => state.pool.threads() as f64,
         })

@@ -160,12 +160,14 @@ fn summary(found: &[Moments]) -> Table {
     table
 }
 
+/// What is drawn at the least: a dip to nothing would hide all else.
+const LEAST: f64 = 1e-7;
+
 fn plot(found: &[Moments], cloud: &str, operator: &str) -> Plot {
     let title = format!("|K_d2 - 1| of {operator}, {cloud}");
-    let mut plot = Plot::new(title, Axis::linear("h_fac"), Axis::log("|K_d2 - 1|"));
-    let shown = |m: &Moments| ["M4", "M5", "M6", "M8", "C2", "C4", "C6"].contains(&m.kernel);
-    for curve in curves(found).filter(|c| c[0].cloud == cloud && c[0].operator == operator && shown(&c[0])) {
-        let points = curve.iter().map(|m| (m.h_fac, m.second.abs().max(1e-7))).collect();
+    let mut plot = Plot::new(title, Axis::linear("h_fac"), Axis::log(&format!("|K_d2 - 1|, {LEAST:.0e} where less")));
+    for curve in curves(found).filter(|c| c[0].cloud == cloud && c[0].operator == operator) {
+        let points = curve.iter().map(|m| (m.h_fac, m.second.abs().max(LEAST))).collect();
         plot.add(curve[0].kernel, Style::Line, points);
     }
     plot

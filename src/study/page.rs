@@ -20,7 +20,7 @@ pub struct Page {
 }
 
 const STYLE: &str = "body{font:15px/1.45 sans-serif;max-width:60em;margin:2em auto;padding:0 1em}\
-table{border-collapse:collapse;font-size:13px}td,th{padding:.15em .6em;border-bottom:1px solid #ddd;text-align:left}\
+table{border-collapse:collapse;font-size:13px}td,th{padding:.15em .6em;border-bottom:1px solid #ddd;text-align:left}.n{text-align:right}\
 svg{max-width:100%;height:auto}";
 
 impl Page {
@@ -42,8 +42,8 @@ impl Page {
         let mut text = format!("{}\n", self.title);
         for table in &self.tables {
             let _ = match table.long {
-                true => writeln!(text, "\n{}: {} rows, with --out in a file", table.name, table.rows.len()),
-                false => write!(text, "\n{}\n{}", table.name, table.text()),
+                true => writeln!(text, "\n{}: {} rows, with --out in a file", table.title(), table.rows.len()),
+                false => write!(text, "\n{}\n{}", table.title(), table.text()),
             };
         }
         text.push('\n');
@@ -85,7 +85,7 @@ impl Page {
 }
 
 fn section(table: &Table) -> String {
-    let (name, rows) = (escaped(table.name), table.html());
+    let (name, rows) = (escaped(&table.title()), table.html());
     match table.long {
         true => format!("<details><summary>{name}: {} rows</summary>\n{rows}</details>\n", table.rows.len()),
         false => format!("<h2>{name}</h2>\n{rows}"),

@@ -3,9 +3,10 @@
 use crate::error::{Error, Result};
 use plotters::coord::Shift;
 use plotters::coord::ranged1d::{DefaultFormatting, KeyPointHint};
-use plotters::element::{Circle, PathElement, Polygon, Text};
-use plotters::prelude::{ChartBuilder, Color, DrawingArea, IntoDrawingArea, RGBColor, Ranged, SVGBackend, WHITE};
-use plotters::style::ShapeStyle;
+use plotters::element::{Circle, Cross, EmptyElement, PathElement, Polygon, Rectangle, Text, TriangleMarker};
+use plotters::prelude::{
+    Cartesian2d, ChartBuilder, ChartContext, Color, DrawingArea, IntoDrawingArea, RGBColor, Ranged, SVGBackend, WHITE,
+};
 use std::ops::Range;
 
 /// Of the drawing, and of the part of it that holds the names of series.
@@ -28,6 +29,19 @@ const COLOURS: [RGBColor; 6] = [
 ];
 const BLACK: RGBColor = RGBColor(0, 0, 0);
 const GREY: RGBColor = RGBColor(200, 200, 200);
+
+/// What a series is marked with: with the colours, more than any plot has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+enum Shape {
+    Disc,
+    Triangle,
+    Cross,
+    Square,
+}
+
+const SHAPES: [Shape; 4] = [Shape::Disc, Shape::Triangle, Shape::Cross, Shape::Square];
+
+type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<Scale, Scale>>;
 
 type Failure<'a> = Box<dyn std::error::Error + 'a>;
 
@@ -191,15 +205,15 @@ impl Plot {
             .light_line_style(WHITE)
             .draw()?;
         for (i, (series, points)) in self.series.iter().zip(placed).enumerate() {
-            let (line, mark) = (self.colour(i).stroke_width(2), self.mark(i));
+            let line = self.colour(i).stroke_width(2);
             match series.style {
                 Style::Area => drop(chart.draw_series([Polygon::new(points, GREY.mix(0.6).filled())])?),
                 Style::Front => drop(chart.draw_series([PathElement::new(points, line)])?),
                 Style::Line => {
                     chart.draw_series([PathElement::new(points.clone(), line)])?;
-                    chart.draw_series(points.into_iter().map(|p| Circle::new(p, 3, mark)))?;
+                    self.marks(&mut chart, i, points)?;
                 }
-                Style::Points => drop(chart.draw_series(points.into_iter().map(|p| Circle::new(p, 3, mark)))?),
+                Style::Points => self.marks(&mut chart, i, points)?,
             }
         }
         self.legend(&names)?;
@@ -213,7 +227,7 @@ impl Plot {
             let y = (TITLE + MARGIN) as i32 + 18 * i as i32;
             match series.style {
                 Style::Front => area.draw(&PathElement::new([(2, y), (16, y)], self.colour(i).stroke_width(2)))?,
-                _ => area.draw(&Circle::new((9, y), 4, self.mark(i)))?,
+                _ => self.mark(area, i, (9, y))?,
             }
             area.draw(&Text::new(series.name.clone(), (22, y - 6), ("sans-serif", 13)))?;
         }
@@ -228,9 +242,45 @@ impl Plot {
         }
     }
 
-    /// Hollow where colours come round again.
-    fn mark(&self, i: usize) -> ShapeStyle {
-        if i < COLOURS.len() { self.colour(i).filled() } else { self.colour(i).stroke_width(1) }
+    /// Another shape where colours come round again.
+    fn shape(&self, i: usize) -> Shape {
+        if self.series[i].style == Style::Area { Shape::Square } else { SHAPES[i / COLOURS.len() % SHAPES.len()] }
+    }
+
+    fn marks<'a>(
+        &self,
+        chart: &mut Chart<'_, 'a>,
+        i: usize,
+        points: Vec<(f64, f64)>,
+    ) -> std::result::Result<(), Failure<'a>> {
+        let (filled, line, points) = (self.colour(i).filled(), self.colour(i).stroke_width(2), points.into_iter());
+        match self.shape(i) {
+            Shape::Disc => drop(chart.draw_series(points.map(|p| Circle::new(p, 3, filled)))?),
+            Shape::Triangle => drop(chart.draw_series(points.map(|p| TriangleMarker::new(p, 5, filled)))?),
+            Shape::Cross => drop(chart.draw_series(points.map(|p| Cross::new(p, 4, line)))?),
+            Shape::Square => {
+                let square = |p| EmptyElement::at(p) + Rectangle::new([(-3, -3), (3, 3)], filled);
+                chart.draw_series(points.map(square))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// The same on the page itself.
+    fn mark<'a>(
+        &self,
+        area: &DrawingArea<SVGBackend<'a>, Shift>,
+        i: usize,
+        (x, y): (i32, i32),
+    ) -> std::result::Result<(), Failure<'a>> {
+        let (filled, line) = (self.colour(i).filled(), self.colour(i).stroke_width(2));
+        match self.shape(i) {
+            Shape::Disc => area.draw(&Circle::new((x, y), 4, filled))?,
+            Shape::Triangle => area.draw(&TriangleMarker::new((x, y), 5, filled))?,
+            Shape::Cross => area.draw(&Cross::new((x, y), 4, line))?,
+            Shape::Square => area.draw(&Rectangle::new([(x - 3, y - 3), (x + 3, y + 3)], filled))?,
+        }
+        Ok(())
     }
 
     fn placed(&self, series: &Series) -> Vec<(f64, f64)> {
@@ -276,8 +326,23 @@ mod tests {
         plot.add("front", Style::Front, vec![(16.0, 1e-2), (32.0, 2.5e-3)]);
         let svg = plot.svg().unwrap();
         assert!(svg.contains("brookshaw") && !svg.contains("http") && !svg.contains("NaN"));
-        assert_eq!(svg.matches("<circle").count(), 2 + 2, "two marks and two in the legend");
+        assert_eq!(svg.matches("<circle").count(), 2 + 1, "two marks and one in the legend; an area has a square");
     }
+
+    #[test]
+    fn every_series_has_its_own_colour_and_mark() {
+        let mut plot = Plot::new("many", Axis::linear("x"), Axis::linear("y"));
+        (0..24).for_each(|i| plot.add(i.to_string(), Style::Line, vec![(0.0, f64::from(i)), (1.0, 1.0)]));
+        let looks: std::collections::HashSet<_> = (0..24)
+            .map(|i| {
+                let RGBColor(r, g, b) = plot.colour(i);
+                (r, g, b, plot.shape(i))
+            })
+            .collect();
+        assert_eq!(looks.len(), 24);
+        assert!(plot.svg().is_ok());
+    }
+
     #[test]
     fn numbers_at_axes_are_round() {
         let log = Axis::log("n");

@@ -82,6 +82,8 @@ pub fn short(v: f64) -> String {
 #[derive(Debug, Clone, Serialize)]
 pub struct Table {
     pub name: &'static str,
+    /// What its rows are about, where the name does not say it.
+    pub case: String,
     pub columns: Vec<Column>,
     pub rows: Vec<Vec<Cell>>,
     /// Too long to be read: left to the files.
@@ -90,7 +92,17 @@ pub struct Table {
 
 impl Table {
     pub fn new(name: &'static str, columns: &[Column]) -> Table {
-        Table { name, columns: columns.to_vec(), rows: Vec::new(), long: false }
+        Table { name, case: String::new(), columns: columns.to_vec(), rows: Vec::new(), long: false }
+    }
+
+    /// The same for a case.
+    pub fn of(self, case: &str) -> Table {
+        Table { case: case.into(), ..self }
+    }
+
+    /// Name and case, for people.
+    pub fn title(&self) -> String {
+        if self.case.is_empty() { self.name.into() } else { format!("{}: {}", self.name, self.case) }
     }
 
     /// For programs only.
@@ -109,6 +121,11 @@ impl Table {
         })
     }
 
+    /// Whether a column is one of texts; numbers stand to the right.
+    fn is_text(&self, c: usize) -> bool {
+        self.rows.first().is_some_and(|row| matches!(row[c], Cell::Text(_)))
+    }
+
     fn lines(&self) -> Vec<Vec<String>> {
         let rows = self.rows.iter().map(|row| row.iter().map(Cell::short).collect());
         std::iter::once(self.head().collect()).chain(rows).collect()
@@ -119,9 +136,8 @@ impl Table {
         let lines = self.lines();
         let width = |c: usize| lines.iter().map(|l| l[c].chars().count()).max().unwrap_or(0);
         let widths: Vec<usize> = (0..self.columns.len()).map(width).collect();
-        let left = |c: usize| self.rows.first().is_some_and(|row| matches!(row[c], Cell::Text(_)));
         lines.iter().fold(String::new(), |mut text, line| {
-            let cells = line.iter().enumerate().map(|(c, cell)| match (left(c), widths[c]) {
+            let cells = line.iter().enumerate().map(|(c, cell)| match (self.is_text(c), widths[c]) {
                 (true, w) => format!("{cell:<w$}"),
                 (false, w) => format!("{cell:>w$}"),
             });
@@ -140,7 +156,9 @@ impl Table {
     /// As an HTML table.
     pub fn html(&self) -> String {
         let row = |cells: &[String], tag: &str| {
-            let cells: String = cells.iter().map(|c| format!("<{tag}>{}</{tag}>", escaped(c))).collect();
+            let class = |c: usize| if self.is_text(c) { "" } else { " class=\"n\"" };
+            let cell = |(c, text): (usize, &String)| format!("<{tag}{}>{}</{tag}>", class(c), escaped(text));
+            let cells: String = cells.iter().enumerate().map(cell).collect();
             format!("<tr>{cells}</tr>\n")
         };
         let lines = self.lines();
@@ -165,7 +183,8 @@ mod tests {
         table.push(["M4<".into(), f64::NAN.into(), 8usize.into()]);
         assert_eq!(table.text(), "  kernel      h [m]   n\n  M6, \"wide\"  0.100  64\n  M4<             -   8\n");
         assert_eq!(table.csv(), "kernel,h [m],n\r\n\"M6, \"\"wide\"\"\",1e-1,64\r\nM4<,,8\r\n");
-        assert!(table.html().contains("<td>M4&lt;</td><td>-</td>"));
+        assert!(table.html().contains("<td>M4&lt;</td><td class=\"n\">-</td>"));
+        assert_eq!((table.title(), table.of("a box").title()), ("errors".into(), "errors: a box".into()));
     }
 
     #[test]

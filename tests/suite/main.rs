@@ -13,6 +13,7 @@ mod consistent;
 mod disorder;
 mod floors;
 mod fortran;
+mod ghosts;
 mod given;
 mod header;
 mod implicit;

@@ -60,6 +60,9 @@ const OURS: [(&str, &str, f64); 5] = [
     ("consistent", "M4", 1.2),
 ];
 
+/// The operator of the peers: what is gained by the same one is set beside what is gained by the best.
+const THEIRS: &str = "brookshaw";
+
 /// What one of them gave.
 struct Found {
     peer: &'static Peer,
@@ -108,10 +111,13 @@ pub fn run(mut request: Request) -> Result<Page> {
         }
     }
     let best = front(&ours, |p| p.seconds);
-    page.tables = vec![peers(&found, &absent), faster(&found, &best), work::table(Table::new("ours", &[]), &best)];
+    let same: Vec<Point> = ours.iter().filter(|p| p.choice.operator == THEIRS).cloned().collect();
+    let same = front(&same, |p| p.seconds);
+    page.tables =
+        vec![peers(&found, &absent), faster(&found, [&best, &same]), work::table(Table::new("ours", &[]), &best)];
     page.tables.retain(|table| !table.rows.is_empty());
     page.plots = vec![plot(&ours, &found)];
-    say(&mut page, &found, &absent, &best);
+    say(&mut page, &found, &absent, [&best, &same]);
     Ok(page)
 }
 
@@ -200,7 +206,7 @@ fn rival<'a>(found: &Found, best: &[&'a Point]) -> Option<&'a Point> {
     best.iter().copied().find(|p| p.error <= found.l2)
 }
 
-fn faster(found: &[Found], best: &[&Point]) -> Table {
+fn faster(found: &[Found], [best, same]: [&[&Point]; 2]) -> Table {
     let names = ["code", "n", "l2"].map(|name| column(name, ""));
     let mut table = Table::new("faster", &names);
     table.columns.extend([
@@ -209,9 +215,12 @@ fn faster(found: &[Found], best: &[&Point]) -> Table {
         column("l2", ""),
         column("run time", "s"),
         column("times faster", ""),
+        column("with their operator", ""),
+        column("times faster with it", ""),
     ]);
     for f in found {
         if let Some(p) = rival(f, best) {
+            let with_theirs = rival(f, same);
             table.push([
                 f.peer.name.into(),
                 (f.n as usize).into(),
@@ -221,6 +230,8 @@ fn faster(found: &[Found], best: &[&Point]) -> Table {
                 p.error.into(),
                 p.seconds.into(),
                 (f.seconds / p.seconds).into(),
+                with_theirs.map_or("none as accurate".into(), |p| p.choice.to_string()).into(),
+                with_theirs.map_or(f64::NAN, |p| f.seconds / p.seconds).into(),
             ]);
         }
     }
@@ -235,7 +246,7 @@ fn plot(ours: &[Point], found: &[Found]) -> super::plot::Plot {
     plot
 }
 
-fn say(page: &mut Page, found: &[Found], absent: &[(&Peer, String)], best: &[&Point]) {
+fn say(page: &mut Page, found: &[Found], absent: &[(&Peer, String)], [best, same]: [&[&Point]; 2]) {
     let threads = std::thread::available_parallelism().map_or(1, |n| n.get());
     page.find(format!(
         "a mode on 3-D particles with 20 % jitter, to 1/e; from particles to answer: neighbours, weights and steps; ours \
@@ -254,7 +265,16 @@ fn say(page: &mut Page, found: &[Found], absent: &[(&Peer, String)], best: &[&Po
                 ),
                 None => "none of ours here is as accurate".to_string(),
             };
-            page.find(format!("{} {version}, {n}^3: {} in {} s; {ours}", peer.name, short(*l2), short(*seconds)));
+            let theirs = match rival(last, same) {
+                Some(p) => format!("; with their operator {}, {:.0} times", p.choice, seconds / p.seconds),
+                None => format!("; {THEIRS} of ours is nowhere as accurate here"),
+            };
+            page.find(format!(
+                "{} {version}, {n}^3: {} in {} s; {ours}{theirs}",
+                peer.name,
+                short(*l2),
+                short(*seconds)
+            ));
         }
     }
     if let Some(p) = best.iter().find(|p| p.error <= 1e-4) {
@@ -288,8 +308,9 @@ mod tests {
         let found = |l2| Found { peer: &PEERS[0], version: "1".into(), n: 10, l2, seconds: 10.0, steps: 9 };
         assert_eq!(rival(&found(2e-2), &best).map(|p| p.seconds), Some(1e-2));
         assert!(rival(&found(1e-5), &best).is_none());
-        let table = faster(&[found(2e-2), found(1e-5)], &best);
+        let table = faster(&[found(2e-2), found(1e-5)], [&best, &best[..1]]);
         assert_eq!(table.rows.len(), 1);
-        assert_eq!(table.rows[0].last(), Some(&1000.0.into()));
+        assert_eq!(table.rows[0][7..9], [1000.0.into(), "none as accurate".into()]);
+        assert_eq!(faster(&[found(6e-2)], [&best, &best[..1]]).rows[0].last(), Some(&1e4.into()));
     }
 }

@@ -169,8 +169,7 @@ fn best(found: &[Shock]) -> Table {
 fn plot(found: &[Shock]) -> Plot {
     let title = format!("l2 error of the density in {}-D, gamma = {:.3}", found[0].dim, found[0].gamma);
     let mut plot = Plot::new(title, Axis::linear("h_fac"), Axis::log("relative l2 error of rho"));
-    let shown = ["M4", "M5", "M6", "M8", "C2", "C4", "C6"];
-    for curve in curves(found).filter(|c| shown.contains(&c[0].kernel)) {
+    for curve in curves(found) {
         plot.add(curve[0].kernel, Style::Line, curve.iter().map(|s| (s.h_fac, s.l2)).collect());
     }
     plot

@@ -3,6 +3,8 @@
 use super::{Case, Expect, Seen, Trial};
 use crate::error::{Error, Result};
 use crate::study::catalogue::Answer;
+use crate::study::page::Page;
+use crate::study::table::{Cell, Table, column};
 use serde::Serialize;
 use std::fmt::Write;
 
@@ -76,7 +78,31 @@ impl Row {
 pub fn answer(rows: &[Row]) -> Result<Answer> {
     let json = serde_json::to_value(rows).map_err(|e| Error::bad("rows", e, "report this, please"))?;
     let failures = rows.iter().filter(|r| !r.verdict.is_right()).count();
-    Ok(Answer { text: text(rows), json, failures, ..Answer::default() })
+    let files = vec![("stability.html".to_string(), page(rows).html()?)];
+    Ok(Answer { text: text(rows), json, failures, files, ..Answer::default() })
+}
+
+/// A table for each case under what it requires.
+fn page(rows: &[Row]) -> Page {
+    let mut page = Page::new("stability", "Cases that break solvers: required and seen");
+    page.find(counts(rows));
+    for case in rows.chunk_by(|a, b| a.case == b.case) {
+        let Row { case: number, title, required, .. } = &case[0];
+        let columns = ["verdict", "words", "seen", "reason"].map(|name| column(name, ""));
+        let mut table = Table::new("case", &columns).of(&format!("{number} {title}: {required}"));
+        for row in case {
+            let words = if row.words.is_empty() { "default" } else { &row.words };
+            table.push([row.verdict.word(), words, &row.seen, &row.reason].map(Cell::from));
+        }
+        page.tables.push(table);
+    }
+    page
+}
+
+fn counts(rows: &[Row]) -> String {
+    let count = |verdict| rows.iter().filter(|r| r.verdict == verdict).count();
+    let counts: Vec<String> = Verdict::ALL.iter().map(|(v, word)| format!("{} {word}", count(*v))).collect();
+    format!("{} rows: {}", rows.len(), counts.join(", "))
 }
 
 fn text(rows: &[Row]) -> String {
@@ -93,8 +119,6 @@ fn text(rows: &[Row]) -> String {
             [row.seen.as_str(), row.reason.as_str()].iter().filter(|s| !s.is_empty()).copied().collect::<Vec<_>>();
         let _ = writeln!(text, "   {:<17}  {words:<45}  {}", row.verdict.word(), seen.join(" | "));
     }
-    let count = |verdict| rows.iter().filter(|r| r.verdict == verdict).count();
-    let counts: Vec<String> = Verdict::ALL.iter().map(|(v, word)| format!("{} {word}", count(*v))).collect();
-    let _ = writeln!(text, "{} rows: {}", rows.len(), counts.join(", "));
+    let _ = writeln!(text, "{}", counts(rows));
     text
 }

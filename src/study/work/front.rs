@@ -34,11 +34,11 @@ pub fn recommend(points: &[Point], doubt: f64) -> Vec<String> {
             break;
         }
         match front.iter().find(|p| p.error <= *wanted) {
-            Some(p) => said.push(format!("for {wanted:.0e}: {}, {} ms ({})", p.choice, millis(p), short(p.error))),
+            Some(p) => said.push(format!("for {wanted:.0e}: {}, {} ({})", p.choice, took(p.seconds), short(p.error))),
             None => {
                 let best = front.last();
                 let best =
-                    best.map(|p| format!("; the best is {} with {}, {} ms", short(p.error), p.choice, millis(p)));
+                    best.map(|p| format!("; the best is {} with {}, {}", short(p.error), p.choice, took(p.seconds)));
                 said.push(format!("for {wanted:.0e}: none of these{}", best.unwrap_or_default()));
                 break;
             }
@@ -47,8 +47,15 @@ pub fn recommend(points: &[Point], doubt: f64) -> Vec<String> {
     said
 }
 
-fn millis(p: &Point) -> String {
-    format!("{:.3}", 1e3 * p.seconds).chars().take(4).collect::<String>().trim_end_matches('.').into()
+/// Three digits, in the unit that suits.
+fn took(seconds: f64) -> String {
+    let (value, unit) = if seconds < 0.9995 { (1e3 * seconds, "ms") } else { (seconds, "s") };
+    let digits = match value {
+        v if v >= 99.95 => 0,
+        v if v >= 9.995 => 1,
+        _ => 2,
+    };
+    format!("{value:.digits$} {unit}")
 }
 
 #[cfg(test)]
@@ -59,6 +66,12 @@ mod tests {
     fn point(seconds: f64, error: f64) -> Point {
         let choice = Choice { operator: "brookshaw", kernel: "M6", h_fac: 1.0, integrator: "rkl2", n: Some(8) };
         Point { choice, particles: 512, neighbours: 100.0, error, seconds, pairs: 1e6 }
+    }
+
+    #[test]
+    fn times_have_three_digits_and_their_unit() {
+        let texts = [1.234e-5, 1.9846e-2, 0.12345, 0.9996, 9.9952, 12.33, 1784.4].map(took);
+        assert_eq!(texts, ["0.01 ms", "19.8 ms", "123 ms", "1.00 s", "10.0 s", "12.3 s", "1784 s"]);
     }
 
     #[test]

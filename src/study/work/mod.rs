@@ -26,7 +26,7 @@ pub struct Point {
     pub choice: Choice,
     pub particles: usize,
     pub neighbours: f64,
-    /// Relative l2; no number where the choice was refused.
+    /// Relative l2; no number where the choice was refused or diverged.
     pub error: f64,
     /// From particles to answer, neighbours and weights included.
     pub seconds: f64,
@@ -39,6 +39,9 @@ impl Point {
         Point { choice, particles: 0, neighbours: 0.0, error: f64::NAN, seconds: f64::NAN, pairs: f64::NAN }
     }
 }
+
+/// A relative error from which nothing of the solution is left: the choice diverged.
+const DIVERGED: f64 = 10.0;
 
 /// Runs shorter than this, s, are repeated once: the first touches cold memory.
 pub const SHORT: f64 = 0.1;
@@ -126,10 +129,14 @@ fn try_once(scene: &Scene, folder: &Path, choice: &Choice, reference: &Reference
         Err(e) if refused(&e) => return Ok(Point::refused(choice)),
         Err(e) => return Err(e),
     };
+    let error = report.accuracy.map_or(f64::NAN, |a| a.l2);
+    if error.is_nan() || error >= DIVERGED {
+        return Ok(Point::refused(choice));
+    }
     let seconds = report.seconds.setup + report.seconds.solve;
     let (particles, neighbours) = (report.particles, report.neighbours);
     let pairs = report.work.applications as f64 * particles as f64 * neighbours;
-    Ok(Point { choice, particles, neighbours, error: report.accuracy.map_or(f64::NAN, |a| a.l2), seconds, pairs })
+    Ok(Point { choice, particles, neighbours, error, seconds, pairs })
 }
 
 const NAMES: [(&str, &str); 2] = [("points", "front"), ("points_2", "front_2")];
@@ -137,12 +144,15 @@ const NAMES: [(&str, &str); 2] = [("points", "front"), ("points_2", "front_2")];
 fn show(page: &mut Page, scene: &str, index: usize, points: &[Point], reference: &Reference) {
     let best = front(points, |p| p.seconds);
     let (all, few) = NAMES[index.min(NAMES.len() - 1)];
-    page.tables.push(table(Table::new(few, &[]), &best));
-    page.tables.push(table(Table::long(all, &[]), &points.iter().collect::<Vec<_>>()));
+    page.tables.push(table(Table::new(few, &[]).of(scene), &best));
+    page.tables.push(table(Table::long(all, &[]).of(scene), &points.iter().collect::<Vec<_>>()));
     page.plots.push(plot(scene, "seconds from particles to answer", points, |p| p.seconds));
     page.plots.push(plot(scene, "pair operations", points, |p| p.pairs));
     let lost = points.iter().filter(|p| p.error.is_nan()).count();
-    page.find(format!("{scene}: {} choices tried, {lost} refused by the solver or its operator", points.len()));
+    page.find(format!(
+        "{scene}: {} choices tried, {lost} refused by the solver or its operator, or diverged",
+        points.len()
+    ));
     let doubt = reference.about().map_or(0.0, |(_, error)| error);
     if let Some((name, error)) = reference.about() {
         page.find(format!(
