@@ -241,7 +241,7 @@ def write_structured(folder):
     grid.SetPoints(positions)
     for name, array in fields.items():
         grid.GetPointData().AddArray(vtk_array(name, array))
-    for name in ["structured_plain.vts", "refused_zlib.vts"]:
+    for name in ["structured_plain.vts", "structured_zlib.vts"]:
         writer = vtk.vtkXMLStructuredGridWriter()
         writer.SetFileName(f"{folder}/{name}")
         writer.SetInputData(grid)

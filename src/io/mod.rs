@@ -9,7 +9,7 @@
 //! | `payload` | the bytes of one array: base64, block headers, decompression |
 //! | `xml_write` | `.vtu`, streamed |
 //! | `legacy_read` | legacy `.vtk` |
-//! | `legacy` | legacy `.vtk` to write, and XML grids of other kinds, through vtkio |
+//! | `legacy` | legacy `.vtk` to write, through vtkio |
 //! | `pvd` | time series of files |
 //! | `atomic` | every file appears whole or not at all |
 
@@ -29,7 +29,7 @@ mod xml_write;
 
 pub use data::{Data, Element};
 pub use pvd::{Entry, Series};
-pub use snapshot::{Field, Snapshot};
+pub use snapshot::{Field, LeftAside, Snapshot};
 pub use view::{Column, Values, View};
 pub use xml_write::{Encoding, Options};
 
@@ -38,13 +38,18 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-/// Reads a particle file: `.vtu`, `.vtp`, `.pvtu`, `.pvtp` (ascii, base64 or raw; plain, zlib or lz4), legacy `.vtk`, and
-/// whatever else vtkio knows. The content decides, not the name. Cells are left aside: particles are points.
+/// Reads a particle file: `.vtu`, `.vtp`, `.vts`, `.pvtu`, `.pvtp` (ascii, base64 or raw; plain, zlib or lz4) and legacy
+/// `.vtk`. The content decides, not the name. Cells are left aside: particles are points; and so are arrays that are not
+/// what they say, see [`Snapshot::left_aside`].
 ///
 /// Errors: `IO` when the system refuses, `BAD_FILE` when the content is wrong, `NO_MEMORY`.
 pub fn read(path: impl AsRef<Path>) -> Result<Snapshot> {
     let path = path.as_ref();
-    read_any(path, true).map_err(|e| in_file(path, e))
+    let mut snapshot = read_any(path, true).map_err(|e| in_file(path, e))?;
+    if snapshot.ghosts > 0 {
+        snapshot.remarks.push(format!("{} points are ghosts (vtkGhostType): left aside", snapshot.ghosts));
+    }
+    Ok(snapshot)
 }
 
 /// Writes a `.vtu`: an unstructured grid with one VERTEX cell per particle.

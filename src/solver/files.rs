@@ -110,7 +110,7 @@ impl Solver {
 
     /// Particles from a VTK file. From a snapshot of ours: all that it holds, in place of what was set before, so that the
     /// solver goes on as the one that wrote it; its words and callbacks stay. From the file of another program: positions,
-    /// every array that has the name of an input, and the time if there is one. Where fewer than three dimensions are
+    /// every array of one component that has the name of an input, and the time if there is one. Where fewer than three dimensions are
     /// filled, they may be along any axes.
     ///
     /// # Errors
@@ -138,8 +138,10 @@ impl Solver {
         let mut found = Vec::new();
         for (slot, input) in FIELDS[..INPUTS].iter().enumerate() {
             let wanted = notes.as_ref().is_none_or(|notes| notes.arrays.contains(&slot));
-            match snapshot.field(input.name).filter(|_| wanted) {
-                Some(field) => found.push((slot, doubles(field)?)),
+            // An array of vectors is not the quantity of that name.
+            let field = if wanted { snapshot.usable(input.name)?.filter(|f| f.components == 1) } else { None };
+            match field {
+                Some(field) => found.push((slot, field.data.to_f64()?)),
                 None if notes.is_some() && wanted => return Err(lacks(input.name)),
                 None => {}
             }
@@ -153,7 +155,7 @@ impl Solver {
         let Some(notes) = notes else {
             let domain = self.state.domain.clone();
             let has_t = found.iter().any(|(slot, _)| *slot == fields::T);
-            let u = snapshot.field("u").filter(|_| !has_t).map(doubles).transpose()?;
+            let u = if has_t { None } else { snapshot.usable("u")?.map(doubles).transpose()? };
             u.iter().try_for_each(|u| check(fields::T, "u", &Strided::packed(u), n))?;
             let energy = u.as_ref().map(|u| Offered::Each(Strided::packed(u)));
             self.state.accept(&Offer { domain, x, given: &given, energy, anew: false })?;
@@ -163,7 +165,7 @@ impl Solver {
         };
         self.refuse_missing_functions(&notes)?;
         let array = |name: &str, like: usize| {
-            let values = snapshot.field(name).map(doubles).transpose()?;
+            let values = snapshot.usable(name)?.map(doubles).transpose()?;
             values.map(|values| check(like, name, &Strided::packed(&values), n).map(|()| values)).transpose()
         };
         let last_h = array(restart::H_START, fields::H)?.unwrap_or_default();

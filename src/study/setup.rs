@@ -121,7 +121,9 @@ impl Setup<'_> {
 
     /// Particles from a file. Of a snapshot's box, that of the scene takes the place.
     fn read_file(&mut self, path: &Path) -> Result<()> {
-        let snapshot = io::read(path)?;
+        let mut snapshot = io::read(path)?;
+        // What the scene gives anew need not be usable in the file.
+        snapshot.left_aside.retain(|l| !self.scene.set.contains_key(&l.name));
         if snapshot.points.is_empty() {
             let reason = "it holds no particles".into();
             return Err(Error::BadFile { path: path.display().to_string(), reason });
@@ -135,6 +137,7 @@ impl Setup<'_> {
         } else if its != before {
             self.remarks.push("the box is that of the file".into());
         }
+        self.remarks.extend(snapshot.remarks.iter().map(|remark| format!("the file: {remark}")));
         let frame = self.solver.frame();
         self.remarks.extend(frame.about().map(|about| format!("the particles lie along {about}")));
         self.x = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
@@ -268,6 +271,7 @@ impl Setup<'_> {
         if let Some(exact) = self.exact.as_ref().filter(|_| text == "exact") {
             return Ok(at_all(exact, &self.x, self.solver.dim(), self.start));
         }
+        self.snapshot.as_ref().map_or(Ok(None), |s| s.usable(text))?;
         let fields = || self.snapshot.iter().flat_map(|s| &s.fields);
         let field = fields().find(|f| f.name == text).ok_or_else(|| {
             let laws = LAWS.iter().filter(|_| name == "kappa").map(|(law, _)| *law);

@@ -96,11 +96,9 @@ fn we_read_what_others_write() {
     for file in &files {
         let name = file.file_name().unwrap().to_string_lossy().into_owned();
         match io::read(file) {
-            Err(e) if name.starts_with("refused") && e.to_string().contains("without compression") => {}
-            Ok(_) if name.starts_with("refused") => wrong.push(format!("{name} was read")),
             Ok(got) => {
                 wrong.extend(difference(&got, &expected(file)).map(|d| format!("{name}: {d}")));
-                // VTK's files carry time and a text; meshio's, lists of pieces and what vtkio reads (.vts) do not.
+                // VTK's files carry time and a text; meshio's, lists of pieces and structured grids (.vts) do not.
                 let ours = !name.starts_with("meshio") && !name.ends_with(".pvtu") && !name.ends_with(".vts");
                 // VTK writes eleven digits into its legacy ascii.
                 let time = if name.contains("legacy") && name.contains("ascii") { 0.3 } else { 0.1 + 0.2 };
