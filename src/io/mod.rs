@@ -5,6 +5,7 @@
 //! | `snapshot`, `data` | a cloud as read: points, fields, time, notes; numbers of every type |
 //! | `view` | a cloud to write: borrowed, or computed a block at a time |
 //! | `xml_read` | `.vtu`, `.vtp` and their parallel lists, in all of VTK's encodings |
+//! | `xml` | the text of XML and its tree, within bounds |
 //! | `split` | an XML file cut into its head and its appended section |
 //! | `payload` | the bytes of one array: base64, block headers, decompression |
 //! | `xml_write` | `.vtu`, streamed |
@@ -24,6 +25,7 @@ mod samples;
 mod snapshot;
 mod split;
 mod view;
+mod xml;
 mod xml_read;
 mod xml_write;
 
@@ -34,6 +36,8 @@ pub use view::{Column, Values, View};
 pub use xml_write::{Encoding, Options};
 
 use crate::error::{Error, Result};
+use crate::memory;
+use atomic::Prepared;
 use std::fs::File;
 use std::io::Read;
 use std::path::Path;
@@ -54,27 +58,68 @@ pub fn read(path: impl AsRef<Path>) -> Result<Snapshot> {
 
 /// Writes a `.vtu`: an unstructured grid with one VERTEX cell per particle.
 pub fn write_vtu(path: impl AsRef<Path>, view: &View, options: Options) -> Result<()> {
-    view.check()?;
-    atomic::replace(path.as_ref(), |sink| xml_write::write(sink, view, options))
+    prepare_vtu(path.as_ref(), view, options)?.publish()
 }
 
 /// Writes a legacy `.vtk` (version 4.2, big-endian), for tools that read nothing newer. The format has no place for time
 /// and notes.
 pub fn write_legacy(path: impl AsRef<Path>, view: &View) -> Result<()> {
+    prepare_legacy(path.as_ref(), view)?.publish()
+}
+
+/// [`write_vtu`] up to where the file gets its name.
+pub fn prepare_vtu(path: &Path, view: &View, options: Options) -> Result<Prepared> {
     view.check()?;
-    let path = path.as_ref();
+    atomic::prepare(path, |sink| xml_write::write(sink, view, options))
+}
+
+/// [`write_legacy`] up to where the file gets its name.
+pub fn prepare_legacy(path: &Path, view: &View) -> Result<Prepared> {
+    view.check()?;
     let bytes = legacy::encode(view).map_err(|e| in_file(path, e))?;
-    atomic::replace(path, |sink| std::io::Write::write_all(sink, &bytes))
+    atomic::prepare(path, |sink| std::io::Write::write_all(sink, &bytes))
 }
 
 fn read_any(path: &Path, whole: bool) -> Result<Snapshot> {
-    let mut file = File::open(path).map_err(system)?;
+    let mut file = open(path)?;
     let mut start = Vec::new();
     file.by_ref().take(16).read_to_end(&mut start).map_err(system)?;
     if !start.starts_with(b"# vtk DataFile") {
         return xml_read::read(file, path, whole);
     }
-    legacy_read::read(&std::fs::read(path).map_err(system)?)
+    let bytes = file.metadata().map_err(system)?.len();
+    if bytes > memory::available() {
+        return Err(memory::no_memory::<u8>("the file", usize::try_from(bytes).unwrap_or(usize::MAX)));
+    }
+    file.read_to_end(&mut start).map_err(system)?;
+    legacy_read::read(&start)
+}
+
+/// Opens what can be read from front to end and again: a pipe would be waited for, a device has no end.
+fn open(path: &Path) -> Result<File> {
+    let about = std::fs::metadata(path).map_err(system)?;
+    let what = if about.is_dir() { "a folder" } else { "a pipe or a device" };
+    match about.is_file() {
+        true => File::open(path).map_err(system),
+        false => Err(system(std::io::Error::other(format!("it is {what}, not a file")))),
+    }
+}
+
+/// A file of words in UTF-8, no longer than people write.
+///
+/// # Errors
+/// `Io`, `BadFile`.
+pub fn words(path: &Path) -> Result<String> {
+    const LONGEST: u64 = 1 << 24;
+    let read = |path| {
+        let mut bytes = Vec::new();
+        open(path)?.take(LONGEST + 1).read_to_end(&mut bytes).map_err(system)?;
+        if bytes.len() as u64 > LONGEST {
+            return Err(broken(format!("it is longer than {LONGEST} bytes")));
+        }
+        String::from_utf8(bytes).map_err(|_| broken("its text is not UTF-8"))
+    };
+    read(path).map_err(|e| in_file(path, e))
 }
 
 /// The content is wrong. The path is added where it is known: [`in_file`].
