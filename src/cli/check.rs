@@ -28,20 +28,20 @@ pub fn text(path: &Path) -> Result<String> {
     let time = snapshot.time.map_or(String::new(), |t| format!(", t = {t}"));
     let along = frame.about().map_or(String::new(), |about| format!(" along {about}"));
     let _ = writeln!(text, "{}: {} particles, {dim}-D{along}{time}", path.display(), snapshot.points.len());
-    let x: Vec<f64> = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
-    for (axis, name) in frame.names().into_iter().enumerate() {
-        let _ = writeln!(text, "  {name:<12}{}", Range::of(x.iter().skip(axis).step_by(dim).copied()));
-    }
-    if let Some((least, mean)) = spacing(&x, dim)? {
-        let note = if least == 0.0 { " (some share one place)" } else { "" };
-        let _ = writeln!(text, "  spacing     nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}");
-    }
     let arrays = snapshot.fields.iter().map(|f| &f.name);
     let others = snapshot.left_aside.iter().map(|l| &l.name).chain(&snapshot.of_cells);
     let width = arrays.chain(others).map(|name| name.chars().count()).max().unwrap_or(0).clamp(11, 40);
     let mut line = |name: &str, about: String| {
         let _ = writeln!(text, "  {:<width$} {about}", one_line(name));
     };
+    let x: Vec<f64> = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
+    for (axis, name) in frame.names().into_iter().enumerate() {
+        line(name, Range::of(x.iter().skip(axis).step_by(dim).copied()).to_string());
+    }
+    if let Some((least, mean)) = spacing(&x, dim)? {
+        let note = if least == 0.0 { " (some share one place)" } else { "" };
+        line("spacing", format!("nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}"));
+    }
     for field in &snapshot.fields {
         line(&field.name, describe(field));
     }
@@ -89,14 +89,28 @@ fn describe(field: &Field) -> String {
     }
 }
 
-/// What must still be given before it can run.
+/// What must still be given before it can run, and which arrays may be it.
 fn missing(snapshot: &Snapshot) -> String {
-    let given = |name: &&str| snapshot.field(name).is_some();
+    let given = |name: &&str| snapshot.field(name).is_some_and(|f| f.components == 1);
     let absent: Vec<&str> = ["m", "T", "kappa"].into_iter().filter(|name| !given(name)).collect();
+    let hint = |name: &&str| {
+        let meant = snapshot.fields.iter().find(|f| f.components == 1 && may_be(&f.name, name))?;
+        Some(format!("; perhaps {name} = {:?}", one_line(&meant.name)))
+    };
+    let hints: String = absent.iter().filter_map(hint).collect();
     match absent.is_empty() {
         true => "nothing is missing".into(),
-        false => format!("still to be given in [set]: {}", absent.join(", ")),
+        false => format!("still to be given in [set]: {}{hints}", absent.join(", ")),
     }
+}
+
+/// Whether an array of this name may hold the quantity: by its name in another case, or by a word that tells of it.
+fn may_be(array: &str, quantity: &str) -> bool {
+    let array = array.to_lowercase();
+    let is_word = |word: &str| array.split(|c: char| !c.is_alphabetic()).any(|part| part == word);
+    let about = FIELDS.iter().find(|f| f.name == quantity).map_or("", |f| f.about);
+    let told = about.split(' ').last().is_some_and(|noun| array.contains(noun));
+    told || is_word(&quantity.to_lowercase()) || (quantity == "T" && is_word("temp"))
 }
 
 struct Range {

@@ -261,11 +261,8 @@ impl ReadValues for Array<'_, '_, '_> {
 }
 
 fn ascii<T: Element>(text: &str, count: usize) -> Found<Vec<T>> {
-    // A number takes a character and a space.
-    if count > text.len() / 2 + 1 {
-        return Err(Fault::Unfit(format!("{count} numbers do not fit into its {} characters", text.len())));
-    }
-    let mut values = crate::memory::reserved("an array of the file", count)?;
+    // A number takes a character and a space: there are no more than so many, whatever the count.
+    let mut values = crate::memory::reserved("an array of the file", count.min(text.len() / 2 + 1))?;
     for word in text.split_ascii_whitespace() {
         if values.len() == count {
             return Err(Fault::Unfit(format!("it has more than {count} numbers")));

@@ -239,11 +239,27 @@ impl Setup<'_> {
                 }
             }
         }
+        self.refuse_cells()?;
         if self.exact.is_some() && !set.contains_key("T") {
             let values = self.array("T", "exact")?;
             self.solver.set("T", Strided::packed(&values))?;
         }
         Ok(())
+    }
+
+    /// What every run needs, where the file has it for cells only and the scene does not give it.
+    fn refuse_cells(&self) -> Result<()> {
+        let Some(snapshot) = &self.snapshot else { return Ok(()) };
+        let given = |name: &str| snapshot.field(name).is_some() || self.scene.set.contains_key(name);
+        let of_cells = |name: &&str| snapshot.of_cells.iter().any(|cell| cell == name) && !given(name);
+        let exact = |name: &&str| *name == "T" && self.exact.is_some();
+        match ["T", "m", "kappa"].iter().find(|name| of_cells(name) && !exact(name)) {
+            Some(name) => {
+                let rule = "particles are points: make it an array of points (ParaView: Cell Data to Point Data)";
+                Err(Error::bad(&format!("array '{name}' of the file"), "of cells", rule))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The masses of a lattice, rho times the volume of a particle, unless the scene sets them.
