@@ -109,7 +109,7 @@ fn may_be(array: &str, quantity: &str) -> bool {
     let array = array.to_lowercase();
     let is_word = |word: &str| array.split(|c: char| !c.is_alphabetic()).any(|part| part == word);
     let about = FIELDS.iter().find(|f| f.name == quantity).map_or("", |f| f.about);
-    let told = about.split(' ').last().is_some_and(|noun| array.contains(noun));
+    let told = about.split(' ').next_back().is_some_and(|noun| array.contains(noun));
     told || is_word(&quantity.to_lowercase()) || (quantity == "T" && is_word("temp"))
 }
 

@@ -529,7 +529,7 @@ mod tests {
     #[test]
     fn a_file_cut_where_a_section_ends_is_refused() {
         for (from, expected) in [("CELL_TYPES", "where CELL_TYPES should"), ("SCALARS", "where an array should")] {
-            let error = read(TEXT[..TEXT.find(from).unwrap()].as_bytes()).unwrap_err().to_string();
+            let error = read(&TEXT.as_bytes()[..TEXT.find(from).unwrap()]).unwrap_err().to_string();
             assert!(error.contains(expected), "{error}");
         }
     }

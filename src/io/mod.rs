@@ -101,7 +101,7 @@ fn open(path: &Path) -> Result<File> {
     let what = if about.is_dir() { "a folder" } else { "a pipe or a device" };
     match about.is_file() {
         true => File::open(path).map_err(system),
-        false => Err(system(std::io::Error::other(format!("it is {what}, not a file")))),
+        false => Err(system(std::io::Error::other(format!("it is {what}, not a file; give a regular one")))),
     }
 }
 

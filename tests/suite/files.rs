@@ -224,6 +224,58 @@ fn vectors_are_written_with_three_components_along_the_axes_of_the_file() {
     }
 }
 
+/// A solver that can be written.
+fn small() -> diffusph::Solver {
+    let mut solver = diffusph::Solver::new("heat dim=2 threads=1 kernel=C2").unwrap();
+    let number =
+        |name: &str, value: f64| io::Field { name: name.into(), components: 1, data: Data::F64(vec![value; 64]) };
+    let points = (0..64).map(|i| [f64::from(i % 8), f64::from(i / 8), 0.0]).collect();
+    let fields = vec![number("T", 300.0), number("m", 1.0), number("kappa", 1.0)];
+    solver.set_snapshot(&io::Snapshot { points, fields, ..io::Snapshot::default() }).unwrap();
+    solver
+}
+
+#[test]
+fn a_series_that_cannot_go_on_stays_as_it_was() {
+    let folder = Folder::new();
+    let mut solver = small();
+    let list = folder.path("run.pvd");
+    for time in [0.0, 1.0, 2.0] {
+        solver.set_number("time", time).unwrap();
+        solver.write_series(&list).unwrap();
+    }
+    let before =
+        ["run.pvd", "run_0000.vtu", "run_0001.vtu", "run_0002.vtu"].map(|n| std::fs::read(folder.path(n)).unwrap());
+    // A rerun, the list of which cannot be replaced.
+    solver.set_number("time", 1.0).unwrap();
+    solver.set_number("T", 400.0).unwrap();
+    let mut series = io::Series::open_or_create(&list).unwrap();
+    std::fs::remove_file(&list).unwrap();
+    std::fs::create_dir(&list).unwrap();
+    assert_eq!(solver.write_in(&mut series, io::Options::default(), &[]).unwrap_err().name(), "IO");
+    std::fs::remove_dir(&list).unwrap();
+    std::fs::write(&list, &before[0]).unwrap();
+    let after =
+        ["run.pvd", "run_0000.vtu", "run_0001.vtu", "run_0002.vtu"].map(|n| std::fs::read(folder.path(n)).unwrap());
+    assert!(before == after);
+    // When it can, what came after goes.
+    solver.write_series(&list).unwrap();
+    let listed: Vec<f64> = io::Series::read(&list).unwrap().entries().iter().map(|e| e.time).collect();
+    assert_eq!((listed, folder.path("run_0002.vtu").exists()), (vec![0.0, 1.0], false));
+}
+
+#[test]
+#[cfg(target_os = "linux")]
+fn a_folder_that_may_not_be_read_may_be_written() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = Folder::new();
+    std::fs::set_permissions(folder.0.path(), std::fs::Permissions::from_mode(0o333)).unwrap();
+    let written = small().write_vtk(folder.path("a.vtu"));
+    std::fs::set_permissions(folder.0.path(), std::fs::Permissions::from_mode(0o700)).unwrap();
+    written.unwrap();
+    assert!(io::read(folder.path("a.vtu")).is_ok());
+}
+
 #[cfg(feature = "cli")]
 mod program {
     use super::*;
