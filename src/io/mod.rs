@@ -53,6 +53,11 @@ pub fn read(path: impl AsRef<Path>) -> Result<Snapshot> {
     if snapshot.ghosts > 0 {
         snapshot.remarks.push(format!("{} points are ghosts (vtkGhostType): left aside", snapshot.ghosts));
     }
+    snapshot
+        .left_aside
+        .iter()
+        .for_each(|l| log::warn!("{}: array '{}' left aside: {}", path.display(), l.name, l.reason));
+    snapshot.remarks.iter().for_each(|remark| log::warn!("{}: {remark}", path.display()));
     Ok(snapshot)
 }
 
@@ -110,7 +115,7 @@ fn open(path: &Path) -> Result<File> {
 /// # Errors
 /// `Io`, `BadFile`.
 pub fn words(path: &Path) -> Result<String> {
-    const LONGEST: u64 = 1 << 24;
+    const LONGEST: u64 = 1 << 26;
     let read = |path| {
         let mut bytes = Vec::new();
         open(path)?.take(LONGEST + 1).read_to_end(&mut bytes).map_err(system)?;
