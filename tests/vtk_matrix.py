@@ -323,6 +323,8 @@ LEGACY_ARRAYS = {
 LEGACY_CELLS = {
     "UNSTRUCTURED_GRID": ["CELLS 4 8", [1, 0, 1, 1, 1, 2, 1, 3], "CELL_TYPES 4", [1, 1, 1, 1]],
     "POLYDATA": ["VERTICES 1 5", [4, 0, 1, 2, 3]],
+    "UNSTRUCTURED_GRID ": ["CELLS 5 4 OFFSETS vtktypeint64", range(5), "CONNECTIVITY vtktypeint64", range(4), "CELL_TYPES 4",
+                           b"", [1, 1, 1, 1]],
     "STRUCTURED_GRID": [],
 }
 CASES = {"upper": str.upper, "lower": str.lower, "title": str.title}
@@ -333,7 +335,8 @@ KEYWORD = "DATASET POINTS CELLS CELL_TYPES VERTICES POINT_DATA CELL_DATA SCALARS
 def legacy(parts, between, case, binary):
     """The parts with white space `between` the words."""
     keywords = set(KEYWORD.split())
-    out = b"# vtk DataFile Version 3.0\ntitle\n" + (b"BINARY" if binary else b"ASCII")
+    version = b"5.1" if any(isinstance(part, str) and "OFFSETS" in part for part in parts) else b"3.0"
+    out = b"# vtk DataFile Version " + version + b"\ntitle\n" + (b"BINARY" if binary else b"ASCII")
     kind = "int"
     for part in parts:
         if isinstance(part, bytes):
@@ -362,7 +365,7 @@ def legacy_layouts(folder):
         for between, case, kind in itertools.product(spaces, CASES, LEGACY_CELLS):
             if binary and "\r" in between:
                 continue
-            if name == "cells" and kind != "UNSTRUCTURED_GRID":
+            if name == "cells" and kind.strip() != "UNSTRUCTURED_GRID":
                 continue
             layout(path(), legacy(grid(kind, "double") + data + arrays, between, case, binary))
     for of, binary in itertools.product(LEGACY_TYPES, [False, True]):

@@ -104,13 +104,15 @@ fn missing(snapshot: &Snapshot) -> String {
     }
 }
 
-/// Whether an array of this name may hold the quantity: by its name in another case, or by a word that tells of it.
+/// Whether an array of this name may hold the quantity: it is its name in another case, or has the word that tells of it.
 fn may_be(array: &str, quantity: &str) -> bool {
+    if FIELDS.iter().any(|f| f.name == array) {
+        return false;
+    }
     let array = array.to_lowercase();
-    let is_word = |word: &str| array.split(|c: char| !c.is_alphabetic()).any(|part| part == word);
     let about = FIELDS.iter().find(|f| f.name == quantity).map_or("", |f| f.about);
     let told = about.split(' ').next_back().is_some_and(|noun| array.contains(noun));
-    told || is_word(&quantity.to_lowercase()) || (quantity == "T" && is_word("temp"))
+    told || array == quantity.to_lowercase() || (quantity == "T" && array.starts_with("temp"))
 }
 
 struct Range {

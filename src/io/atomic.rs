@@ -126,7 +126,8 @@ impl Drop for Temporary {
 /// Removes what killed processes left unfinished: files of our name that nobody has locked.
 fn remove_stale(folder: &Path) {
     let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    for entry in entries.filter(|entry| is_temporary(&entry.file_name())) {
+    let is_file = |entry: &std::fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
+    for entry in entries.filter(|entry| is_temporary(&entry.file_name()) && is_file(entry)) {
         // Without an answer about the lock somebody may hold it.
         let stale = File::open(entry.path()).and_then(|file| file.try_lock().map(|()| file).map_err(io::Error::from));
         if let Ok(_lock) = stale {

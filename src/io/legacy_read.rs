@@ -418,8 +418,9 @@ impl ReadValues for Values<'_, '_> {
     }
 }
 
+/// What C takes for white space.
 fn is_space(byte: &u8) -> bool {
-    byte.is_ascii_whitespace() || *byte == 0x0b
+    matches!(byte, b' ' | b'\t'..=b'\r')
 }
 
 /// The first word, empty where there is none, and what follows it.

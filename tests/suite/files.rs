@@ -291,7 +291,8 @@ mod program {
     fn check_tells_what_it_leaves_aside_and_what_may_be_meant() {
         let folder = Folder::new();
         let long = "a_name_of_more_than_twelve_characters";
-        let arrays = array("Float64", "Temperature", "", "1 2 3 4")
+        let arrays = array("Float64", "T_ambient", "", "1 2 3 4")
+            + &array("Float64", "Temperature", "", "1 2 3 4")
             + &array("UInt8", long, "", "1 2 3 4")
             + &array("Float64", "m", "NumberOfComponents=\"3\"", &"0 0 1 ".repeat(4))
             + &array("Float64", "p", "", "1 2 3");
