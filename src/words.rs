@@ -2,6 +2,7 @@
 //! files, the command line, file metadata and reports.
 
 use crate::error::{Error, Result};
+use std::collections::HashSet;
 
 /// A line of words: bare ones, and `key=value` pairs. Every word must be used, or it is an error.
 #[derive(Debug, Clone)]
@@ -16,13 +17,14 @@ impl<'a> Words<'a> {
     /// Splits at white space and at the first `=` of each word. `what` names the line in errors.
     pub fn parse(what: &'a str, line: &'a str) -> Result<Words<'a>> {
         let mut words = Words { what, bare: Vec::new(), pairs: Vec::new(), known: Vec::new() };
+        let mut keys = HashSet::new();
         for word in line.split_whitespace() {
             match word.split_once('=') {
                 None => words.bare.push(word),
                 Some((key, value)) if key.is_empty() || value.is_empty() => {
                     return Err(Error::bad(what, format!("'{word}'"), "write key=value without spaces around the ="));
                 }
-                Some((key, _)) if words.pairs.iter().any(|(k, _)| *k == key) => {
+                Some((key, _)) if !keys.insert(key) => {
                     return Err(Error::bad(what, format!("'{line}'"), &format!("{key} is given twice")));
                 }
                 Some(pair) => words.pairs.push(pair),

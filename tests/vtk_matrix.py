@@ -1,12 +1,15 @@
 """The other side of vtk_matrix.rs: writes files with the packages that users have, and reads ours with them.
 
     vtk_matrix.py write FOLDER    fills FOLDER with files and, for each, the arrays that a reader must find
+    vtk_matrix.py layouts FOLDER  fills FOLDER with files laid out in every way that programs do it and, for each, the arrays
+                                  that VTK finds in it, T among them
     vtk_matrix.py read FOLDER     reads the files in FOLDER and compares them with the arrays beside them
 
 The arrays of `case.ending` lie in `case.ending.arrays/`: one file of little-endian bytes per array, called
 `number,type,components,name`; number 0 is the points. With DIFFUSPH_WITHOUT=pyvista, what pyvista does is left out.
 """
 
+import base64
 import itertools
 import os
 import shutil
@@ -241,7 +244,7 @@ def write_structured(folder):
     grid.SetPoints(positions)
     for name, array in fields.items():
         grid.GetPointData().AddArray(vtk_array(name, array))
-    for name in ["structured_plain.vts", "refused_zlib.vts"]:
+    for name in ["structured_plain.vts", "structured_zlib.vts"]:
         writer = vtk.vtkXMLStructuredGridWriter()
         writer.SetFileName(f"{folder}/{name}")
         writer.SetInputData(grid)
@@ -261,6 +264,184 @@ def copy_data(folder):
         shutil.copy(os.path.join(data, name), path)
         mesh = meshio.read(path)
         expect(path, mesh.points, mesh.point_data)
+
+
+def stored_by_vtk(path):
+    """What VTK finds: points and the numbers of each of them, or None where it finds no points or no T."""
+    if path.endswith(".vtk"):
+        reader = vtk.vtkGenericDataObjectReader()
+        for what in ["Scalars", "Vectors", "Normals", "Tensors", "ColorScalars", "TCoords", "Fields"]:
+            getattr(reader, f"ReadAll{what}On")()
+    else:
+        reader = {"vtu": vtk.vtkXMLUnstructuredGridReader, "vtp": vtk.vtkXMLPolyDataReader}[path[-3:]]()
+    reader.SetFileName(path)
+    reader.Update()
+    data = reader.GetOutput()
+    if not data or not data.GetNumberOfPoints() or not data.GetPointData().GetArray("T"):
+        return None
+    arrays = [data.GetPointData().GetArray(i) for i in range(data.GetPointData().GetNumberOfArrays())]
+    numbers = [a for a in arrays if a and a.GetDataTypeAsString() != "bit"]
+    whole = [a for a in numbers if a.GetNumberOfTuples() == data.GetNumberOfPoints()]
+    return vtk_to_numpy(data.GetPoints().GetData()), {a.GetName(): vtk_to_numpy(a) for a in whole}
+
+
+def layout(path, content):
+    """Lays out one file, with what VTK reads from it beside it."""
+    with open(path, "wb") as file:
+        file.write(content)
+    found = stored_by_vtk(path)
+    assert found, f"VTK does not read {path}: {content[:2000]}"
+    expect(path, found[0], found[1])
+
+
+LEGACY_TYPES = {"double": ">f8", "float": ">f4", "long": ">i8", "vtktypeint64": ">i8", "unsigned_long": ">u8", "int": ">i4",
+                "unsigned_int": ">u4", "short": ">i2", "unsigned_short": ">u2", "char": ">i1", "signed_char": ">i1",
+                "unsigned_char": ">u1", "vtkIdType": ">i4", "DOUBLE": ">f8", "Float": ">f4"}
+SQUARE = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+# Words between which any white space may stand; numbers, of the type whose name is the last word before them.
+LEGACY_ARRAYS = {
+    "components": ["SCALARS T double 1 LOOKUP_TABLE default", [1, 2, 3, 4]],
+    "no components": ["SCALARS T float LOOKUP_TABLE default", [1, 2, 3, 4]],
+    "field": ["FIELD f 1 T 1 4 double", [1, 2, 3, 4]],
+    "two fields": ["FIELD f 2 v 3 4 float", range(12), "T 1 4 int", [1, 2, 3, 4]],
+    "vectors": ["VECTORS v double", range(12), "SCALARS T double LOOKUP_TABLE default", [1, 2, 3, 4]],
+    "normals": ["NORMALS n float", range(12), "SCALARS T double LOOKUP_TABLE default", [1, 2, 3, 4]],
+    "tensors": ["TENSORS t float", range(36), "SCALARS T double LOOKUP_TABLE default", [1, 2, 3, 4]],
+    "six": ["TENSORS6 t float", range(24), "SCALARS T double LOOKUP_TABLE default", [1, 2, 3, 4]],
+    "textures": ["TEXTURE_COORDINATES c 2 float", range(8), "FIELD f 1 T 1 4 double", [1, 2, 3, 4]],
+    "ids": ["GLOBAL_IDS id vtkIdType", range(4), "PEDIGREE_IDS p int", range(4), "FIELD f 1 T 1 4 double", [1, 2, 3, 4]],
+    "edges": ["EDGE_FLAGS e int", range(4), "FIELD f 1 T 1 4 double", [1, 2, 3, 4]],
+    "null": ["FIELD f 2 NULL_ARRAY T 1 4 double", [1, 2, 3, 4]],
+    "five": ["FIELD f 2 odd 5 4 unsigned_char", range(20), "T 1 4 double", [1, 2, 3, 4]],
+    "long": ["FIELD f 2 short 1 2 double", range(2), "T 1 4 double", [1, 2, 3, 4]],
+    "metadata": ["SCALARS T double LOOKUP_TABLE default", [1, 2, 3, 4], "METADATA", b"\nCOMPONENT_NAMES\nkelvin\n\n",
+                 "VECTORS v double", range(12)],
+    "texts": ["FIELD f 2 words 1 2 string", b"\na%20b\n\n", "T 1 4 double", [1, 2, 3, 4]],
+    "cells": ["CELL_DATA 4 SCALARS T int LOOKUP_TABLE default", [5, 6, 7, 8], "POINT_DATA 4 SCALARS T double LOOKUP_TABLE x",
+              [1, 2, 3, 4], "LOOKUP_TABLE x 0"],
+}
+LEGACY_CELLS = {
+    "UNSTRUCTURED_GRID": ["CELLS 4 8", [1, 0, 1, 1, 1, 2, 1, 3], "CELL_TYPES 4", [1, 1, 1, 1]],
+    "POLYDATA": ["VERTICES 1 5", [4, 0, 1, 2, 3]],
+    "UNSTRUCTURED_GRID ": ["CELLS 5 4 OFFSETS vtktypeint64", range(5), "CONNECTIVITY vtktypeint64", range(4), "CELL_TYPES 4",
+                           b"", [1, 1, 1, 1]],
+    "STRUCTURED_GRID": [],
+}
+CASES = {"upper": str.upper, "lower": str.lower, "title": str.title}
+KEYWORD = "DATASET POINTS CELLS CELL_TYPES VERTICES POINT_DATA CELL_DATA SCALARS LOOKUP_TABLE FIELD VECTORS NORMALS TENSORS " \
+          "TENSORS6 TEXTURE_COORDINATES GLOBAL_IDS PEDIGREE_IDS EDGE_FLAGS METADATA DIMENSIONS"
+
+
+def legacy(parts, between, case, binary):
+    """The parts with white space `between` the words."""
+    keywords = set(KEYWORD.split())
+    version = b"5.1" if any(isinstance(part, str) and "OFFSETS" in part for part in parts) else b"3.0"
+    out = b"# vtk DataFile Version " + version + b"\ntitle\n" + (b"BINARY" if binary else b"ASCII")
+    kind = "int"
+    for part in parts:
+        if isinstance(part, bytes):
+            out += part
+        elif isinstance(part, str):
+            words = [CASES[case](w) if w in keywords else w for w in part.split()]
+            out += between.encode() + between.join(words).encode()
+            kind = next((w for w in reversed(words) if w in LEGACY_TYPES), "int")
+        elif binary:
+            out += b"\n" + np.array(part).astype(LEGACY_TYPES[kind]).tobytes() + b"\n"
+        else:
+            out += between.encode() + between.join(str(v) for v in part).encode()
+    return out + b"\n"
+
+
+def legacy_layouts(folder):
+    count = itertools.count()
+    path = lambda: f"{folder}/layout_{next(count)}.vtk"
+    spaces = [" ", "\n", "\t", "\r\n", "\n\n ", " \n", "\v "]
+    grid = lambda kind, of: ["DATASET " + kind] + (["DIMENSIONS 2 2 1"] if kind == "STRUCTURED_GRID" else []) \
+        + ["POINTS 4 " + of, SQUARE.ravel()] + LEGACY_CELLS[kind]
+    for (name, arrays), binary in itertools.product(LEGACY_ARRAYS.items(), [False, True]):
+        if binary and name == "texts":
+            continue  # they have lengths there: see write_legacy
+        data = [] if name == "cells" else ["POINT_DATA 4"]
+        for between, case, kind in itertools.product(spaces, CASES, LEGACY_CELLS):
+            if binary and "\r" in between:
+                continue
+            if name == "cells" and kind.strip() != "UNSTRUCTURED_GRID":
+                continue
+            layout(path(), legacy(grid(kind, "double") + data + arrays, between, case, binary))
+    for of, binary in itertools.product(LEGACY_TYPES, [False, True]):
+        arrays = ["POINT_DATA 4", f"SCALARS T {of} LOOKUP_TABLE default", [1, 2, 3, 4]]
+        layout(path(), legacy(grid("POLYDATA", of) + arrays, "\n", "upper", binary))
+    for number in ["1.0", "1e0", "+1", "1.", ".5", "-.5e-3", "1E+2", "nan", "001"]:
+        arrays = ["POINT_DATA 4", "SCALARS T double LOOKUP_TABLE default", [number] * 4]
+        layout(path(), legacy(grid("POLYDATA", "float") + arrays, " ", "upper", False))
+
+
+XML_TYPES = {"Float64": "f8", "Float32": "f4", "Int64": "i8", "UInt64": "u8", "Int32": "i4", "UInt32": "u4", "Int16": "i2",
+             "UInt16": "u2", "Int8": "i1", "UInt8": "u1"}
+XML_OTHERS = {
+    "nothing": "",
+    "texts": '<Array type="String" Name="words" format="ascii">65 0 66 0 67 0 68 0</Array>',
+    "bits": '<DataArray type="Bit" Name="bits" format="ascii">1 0 1 0</DataArray>',
+    "five": '<DataArray type="UInt8" Name="odd" NumberOfComponents="5" format="ascii">' + "1 2 3 4 5 " * 4 + "</DataArray>",
+    "longer": '<DataArray type="Float64" Name="p" format="ascii">1 2 3 4 5 6</DataArray>',
+    "nine": '<DataArray type="Float64" Name="S" format="ascii">' + "1 2 3 4 5 6 7 8 9 " * 4 + "</DataArray>",
+    "outside": '<DataArray type="UInt8" Name="c" format="ascii">300 -1 2 3</DataArray>',
+}
+# Each head with what it does to the bytes of a file.
+XML_HEADS = {
+    "none": lambda text: text,
+    "plain": lambda text: b'<?xml version="1.0"?>\n' + text,
+    "mark": lambda text: b"\xef\xbb\xbf" + text,
+    "latin": lambda text: b'<?xml version="1.0" encoding="ISO-8859-1"?>' + text.replace(b"Name='v'", b"Name='v\xfc'"),
+    "ascii": lambda text: b'<?xml version="1.0" encoding="US-ASCII"?>' + text,
+    "doctype": lambda text: b'<?xml version="1.0"?>\n<!DOCTYPE VTKFile SYSTEM "vtk.dtd">\n' + text,
+    "comment": lambda text: b"<!-- <VTKFile a='>'> -->" + text,
+}
+XML_FORMATS = {
+    "digits": ["ascii", "ASCII", "Ascii", "", None, "append", "appended", "Binary"],
+    "base64": ["binary"],
+    "offset": ["appended", "append", "ascii", "binary", "", None],
+}
+
+
+def xml(how, form, word, encoding, kinds, more):
+    """A file of a square with T and v, each array stored in the same way."""
+    appended, offset = b"", 0
+
+    def array(name, kind, components, values):
+        nonlocal appended, offset
+        values = np.array(values).astype("<" + XML_TYPES[kind])
+        head = f"<DataArray type='{kind}' Name='{name}' NumberOfComponents='{components}'"
+        head += "" if form is None else f" format='{form}'"
+        stored = np.array([values.nbytes]).astype("<u8" if word == "UInt64" else "<u4").tobytes() + values.tobytes()
+        if how == "digits":
+            return f"{head}>\n {' '.join(str(v) for v in values.ravel())}\n</DataArray>"
+        if how == "base64":
+            return f"{head}>\n{base64.b64encode(stored).decode()}\n</DataArray>"
+        stored = base64.b64encode(stored) if encoding == "base64" else stored
+        head += f" offset='{offset}'/>"
+        appended, offset = appended + stored, offset + len(stored)
+        return head
+
+    points = array("Points", kinds[0], 3, SQUARE)
+    data = array("T", kinds[1], 1, [1, 2, 3, 4]) + array("v", "Float32", 3, np.arange(12).reshape(4, 3)) + more
+    text = f"<VTKFile type='UnstructuredGrid' version='1.0' byte_order='LittleEndian' header_type='{word}'>" \
+           f"<UnstructuredGrid><Piece NumberOfPoints='4' NumberOfCells='0'><PointData>{data}</PointData>" \
+           f"<Points>{points}</Points></Piece></UnstructuredGrid>"
+    tail = f"<AppendedData encoding='{encoding}'>_".encode() + appended + b"</AppendedData>" if how == "offset" else b""
+    return text.encode() + tail + b"</VTKFile>"
+
+
+def xml_layouts(folder):
+    count = itertools.count()
+    path = lambda: f"{folder}/layout_{next(count)}.vtu"
+    for how, forms in XML_FORMATS.items():
+        for form, word, encoding in itertools.product(forms, ["UInt32", "UInt64"], ["raw", "base64"]):
+            for other, head in itertools.product(XML_OTHERS.values(), XML_HEADS.values()):
+                if how == "offset" or encoding == "raw":
+                    layout(path(), head(xml(how, form, word, encoding, ["Float64", "Float64"], other)))
+        for kinds in itertools.product(XML_TYPES, XML_TYPES):
+            layout(path(), xml(how, forms[0], "UInt64", "raw", kinds, ""))
 
 
 def read_expected(path):
@@ -349,5 +530,9 @@ if __name__ == "__main__":
         write_legacy(folder)
         write_structured(folder)
         copy_data(folder)
+    elif task == "layouts":
+        vtk.vtkObject.GlobalWarningDisplayOff()
+        legacy_layouts(folder)
+        xml_layouts(folder)
     else:
         read(folder)

@@ -2,7 +2,7 @@
 
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::io::{self, Field, Snapshot};
+use crate::io::{self, Field, LeftAside, Snapshot};
 use crate::model::fields::{Access, FIELDS};
 use crate::pool::Pool;
 use crate::solver::Solver;
@@ -28,31 +28,59 @@ pub fn text(path: &Path) -> Result<String> {
     let time = snapshot.time.map_or(String::new(), |t| format!(", t = {t}"));
     let along = frame.about().map_or(String::new(), |about| format!(" along {about}"));
     let _ = writeln!(text, "{}: {} particles, {dim}-D{along}{time}", path.display(), snapshot.points.len());
+    let arrays = snapshot.fields.iter().map(|f| &f.name);
+    let others = snapshot.left_aside.iter().map(|l| &l.name).chain(&snapshot.of_cells);
+    let width = arrays.chain(others).map(|name| name.chars().count()).max().unwrap_or(0).clamp(11, 40);
+    let mut line = |name: &str, about: String| {
+        let _ = writeln!(text, "  {:<width$} {about}", one_line(name));
+    };
     let x: Vec<f64> = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
     for (axis, name) in frame.names().into_iter().enumerate() {
-        let _ = writeln!(text, "  {name:<12}{}", Range::of(x.iter().skip(axis).step_by(dim).copied()));
+        line(name, Range::of(x.iter().skip(axis).step_by(dim).copied()).to_string());
     }
     if let Some((least, mean)) = spacing(&x, dim)? {
         let note = if least == 0.0 { " (some share one place)" } else { "" };
-        let _ = writeln!(text, "  spacing     nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}");
+        line("spacing", format!("nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}"));
     }
     for field in &snapshot.fields {
-        let _ = writeln!(text, "  {:<12}{}", field.name, describe(field));
+        line(&field.name, describe(field));
     }
-    for (name, note) in &snapshot.notes {
-        let _ = writeln!(text, "  note        {name}: {note}");
+    for LeftAside { name, reason } in &snapshot.left_aside {
+        line(name, format!("left aside: {reason}"));
     }
     for name in &snapshot.of_cells {
-        let _ = writeln!(text, "  {name:<12}of cells, not of points: left aside");
+        line(
+            name,
+            "of cells, not of points: left aside; make it one of points (ParaView: Cell Data to Point Data)".into(),
+        );
+    }
+    for (name, note) in &snapshot.notes {
+        line("note", format!("{name}: {}", one_line(note)));
+    }
+    for remark in &snapshot.remarks {
+        line("remark", remark.clone());
     }
     let _ = writeln!(text, "usable; {}", missing(&snapshot));
     Ok(text)
 }
 
+/// A text of a file as a terminal can show it: its first characters, in one line.
+fn one_line(text: &str) -> String {
+    let mut shown: String = text.chars().map(|c| if c.is_control() { ' ' } else { c }).take(LONGEST).collect();
+    if text.chars().nth(LONGEST).is_some() {
+        shown.push('…');
+    }
+    shown
+}
+
+/// The most characters that are shown of a text.
+const LONGEST: usize = 200;
+
 fn describe(field: &Field) -> String {
     let kind = format!("{} x {}", field.components, field.data.type_name());
     let role = match FIELDS.iter().find(|f| f.name == field.name).map(|f| f.access) {
-        Some(Access::Input { .. }) => "taken",
+        Some(Access::Input { .. }) if field.components == 1 => "taken",
+        Some(Access::Input { .. }) => "left aside: a quantity has one component",
         _ => "left aside",
     };
     match field.data.to_f64() {
@@ -61,14 +89,30 @@ fn describe(field: &Field) -> String {
     }
 }
 
-/// What must still be given before it can run.
+/// What must still be given before it can run, and which arrays may be it.
 fn missing(snapshot: &Snapshot) -> String {
-    let given = |name: &&str| snapshot.field(name).is_some();
+    let given = |name: &&str| snapshot.field(name).is_some_and(|f| f.components == 1);
     let absent: Vec<&str> = ["m", "T", "kappa"].into_iter().filter(|name| !given(name)).collect();
+    let hint = |name: &&str| {
+        let meant = snapshot.fields.iter().find(|f| f.components == 1 && may_be(&f.name, name))?;
+        Some(format!("; perhaps {name} = {:?}", one_line(&meant.name)))
+    };
+    let hints: String = absent.iter().filter_map(hint).collect();
     match absent.is_empty() {
         true => "nothing is missing".into(),
-        false => format!("still to be given in [set]: {}", absent.join(", ")),
+        false => format!("still to be given in [set]: {}{hints}", absent.join(", ")),
     }
+}
+
+/// Whether an array of this name may hold the quantity: it is its name in another case, or has the word that tells of it.
+fn may_be(array: &str, quantity: &str) -> bool {
+    if FIELDS.iter().any(|f| f.name == array) {
+        return false;
+    }
+    let array = array.to_lowercase();
+    let about = FIELDS.iter().find(|f| f.name == quantity).map_or("", |f| f.about);
+    let told = about.split(' ').next_back().is_some_and(|noun| array.contains(noun));
+    told || array == quantity.to_lowercase() || (quantity == "T" && array.starts_with("temp"))
 }
 
 struct Range {

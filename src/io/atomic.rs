@@ -2,17 +2,40 @@
 //! and the folder synced. Whoever polls the folder never sees half a file; a full disk leaves the old one intact.
 
 use crate::error::{Error, Result};
-use std::fs::{File, OpenOptions};
+use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Makes or replaces the file at `path` by what `fill` writes, or fails and leaves everything as it was.
 pub fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
-    replace_or_fail(path, fill).map_err(|e| Error::Io {
-        path: path.display().to_string(),
-        reason: format!("cannot write it: {e}; free some space or choose another place"),
-    })
+    prepare(path, fill)?.publish()
+}
+
+/// Writes what is to be at `path` in full, and leaves the path as it is.
+pub fn prepare(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<Prepared> {
+    prepare_or_fail(path, fill).map_err(|e| failed(path, &e))
+}
+
+/// A file that only needs its name; without one it goes.
+pub struct Prepared {
+    temporary: Temporary,
+    path: PathBuf,
+    /// Its folder, where that can be opened.
+    folder: Option<File>,
+}
+
+impl Prepared {
+    /// Gives the file its name.
+    pub fn publish(self) -> Result<()> {
+        let done = std::fs::rename(&self.temporary.path, &self.path).and_then(|()| self.folder.map_or(Ok(()), sync));
+        done.map_err(|e| failed(&self.path, &e))
+    }
+}
+
+fn failed(path: &Path, error: &io::Error) -> Error {
+    let reason = format!("cannot write it: {error}; free some space or choose another place");
+    Error::Io { path: path.display().to_string(), reason }
 }
 
 /// Makes a folder and those above it where they are not there yet.
@@ -21,17 +44,24 @@ pub fn make_folder(folder: &Path) -> Result<()> {
     std::fs::create_dir_all(folder).map_err(failed)
 }
 
-fn replace_or_fail(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+fn prepare_or_fail(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<Prepared> {
+    let before = path.metadata().ok();
     // A device or a pipe would be swapped for a plain file by the rename.
-    if path.metadata().is_ok_and(|m| !m.is_file()) {
+    if before.as_ref().is_some_and(|m| !m.is_file()) {
         return Err(io::Error::other("it exists and is not a regular file"));
     }
-    let name = path.file_name().ok_or_else(|| io::Error::other("the path ends in no file name"))?;
+    if path.file_name().is_none() {
+        return Err(io::Error::other("the path ends in no file name"));
+    }
     let folder = folder_of(path);
-    let (temporary, file) = Temporary::create(folder, name)?;
-    fill_and_sync(file, fill)?;
-    std::fs::rename(&temporary.0, path)?;
-    sync_folder(folder)
+    let temporary = Temporary::create(folder)?;
+    if let Some(before) = before {
+        temporary.file.set_permissions(before.permissions())?;
+    }
+    fill_and_sync(temporary.file.try_clone()?, fill)?;
+    // A folder that may not be read cannot be synced; only Unix lets one open a folder.
+    let folder = File::open(folder).ok().filter(|_| cfg!(unix));
+    Ok(Prepared { temporary, path: path.into(), folder })
 }
 
 /// The folder that a file of this path lies in.
@@ -46,30 +76,39 @@ fn fill_and_sync(file: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Resu
     sink.get_ref().sync_all()
 }
 
-fn sync_folder(folder: &Path) -> io::Result<()> {
-    if cfg!(not(unix)) {
-        return Ok(()); // only Unix lets one open a folder
-    }
-    match File::open(folder)?.sync_all() {
+fn sync(folder: File) -> io::Result<()> {
+    match folder.sync_all() {
         // Some network file systems have no sync for folders; the rename is done all the same.
         Err(e) if matches!(e.kind(), io::ErrorKind::InvalidInput | io::ErrorKind::Unsupported) => Ok(()),
         done => done,
     }
 }
 
-/// The name of an unfinished file; a file that still has it goes with it.
-struct Temporary(PathBuf);
+/// An unfinished file; it goes with this unless it has got another name. It is locked as long as somebody writes it.
+struct Temporary {
+    path: PathBuf,
+    file: File,
+}
+
+/// What the names of unfinished files begin and end with.
+const HEAD: &str = ".diffusph.";
+const TAIL: &str = ".tmp";
 
 impl Temporary {
-    fn create(folder: &Path, name: &std::ffi::OsStr) -> io::Result<(Temporary, File)> {
+    fn create(folder: &Path) -> io::Result<Temporary> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
+        remove_stale(folder);
         loop {
-            let mut hidden = std::ffi::OsString::from(".");
-            hidden.push(name);
-            hidden.push(format!(".{}.{}.tmp", std::process::id(), COUNT.fetch_add(1, Ordering::Relaxed)));
-            let path = folder.join(hidden);
+            let number = COUNT.fetch_add(1, Ordering::Relaxed);
+            let path = folder.join(format!("{HEAD}{}.{number}{TAIL}", std::process::id()));
             match OpenOptions::new().write(true).create_new(true).open(&path) {
-                Ok(file) => return Ok((Temporary(path), file)),
+                Ok(file) => {
+                    // Whoever removes stale files may have found it before it was locked. Without locks there is no such.
+                    let lost = matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !path.exists();
+                    if !lost {
+                        return Ok(Temporary { path, file });
+                    }
+                }
                 // Left by a killed process that had our number, or another host's on a shared disk: take the next.
                 Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
                 Err(e) => return Err(e),
@@ -80,8 +119,27 @@ impl Temporary {
 
 impl Drop for Temporary {
     fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.0);
+        let _ = std::fs::remove_file(&self.path);
     }
+}
+
+/// Removes what killed processes left unfinished: files of our name that nobody has locked.
+fn remove_stale(folder: &Path) {
+    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_file = |entry: &std::fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
+    for entry in entries.filter(|entry| is_temporary(&entry.file_name()) && is_file(entry)) {
+        // Without an answer about the lock somebody may hold it.
+        let stale = File::open(entry.path()).and_then(|file| file.try_lock().map(|()| file).map_err(io::Error::from));
+        if let Ok(_lock) = stale {
+            let _ = std::fs::remove_file(entry.path());
+        }
+    }
+}
+
+fn is_temporary(name: &std::ffi::OsStr) -> bool {
+    let numbers = name.to_str().and_then(|name| name.strip_prefix(HEAD)?.strip_suffix(TAIL)?.split_once('.'));
+    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
+    numbers.is_some_and(|(process, number)| digits(process) && digits(number))
 }
 
 #[cfg(test)]
@@ -121,6 +179,36 @@ mod tests {
         assert!(text.contains("a.vtu") && text.contains("no storage space"), "{text}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(names(dir.path()), ["a.vtu"]);
+    }
+
+    #[test]
+    fn what_a_killed_process_left_goes_and_what_is_being_written_stays() {
+        let dir = tempfile::tempdir().unwrap();
+        let stale = dir.path().join(".diffusph.4194305.0.tmp");
+        let other = dir.path().join(".diffusph.mine.tmp");
+        for path in [&stale, &other] {
+            std::fs::write(path, "half").unwrap();
+        }
+        let unfinished = prepare(&dir.path().join("a.vtu"), |sink| sink.write_all(b"whole")).unwrap();
+        replace(&dir.path().join("b.vtu"), |sink| sink.write_all(b"whole")).unwrap();
+        unfinished.publish().unwrap();
+        let mut left = names(dir.path());
+        left.sort();
+        assert_eq!(left, [".diffusph.mine.tmp", "a.vtu", "b.vtu"]);
+    }
+
+    #[test]
+    #[cfg(unix)]
+    fn a_file_keeps_its_mode() {
+        use std::os::unix::fs::PermissionsExt;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.vtu");
+        std::fs::write(&path, "old").unwrap();
+        for mode in [0o640, 0o600, 0o444] {
+            std::fs::set_permissions(&path, std::fs::Permissions::from_mode(mode)).unwrap();
+            replace(&path, |sink| sink.write_all(b"new")).unwrap();
+            assert_eq!(path.metadata().unwrap().permissions().mode() & 0o777, mode);
+        }
     }
 
     #[test]

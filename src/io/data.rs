@@ -1,5 +1,6 @@
 //! Numbers in the types that files have them in.
 
+use super::broken;
 use super::view::Values;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -17,7 +18,44 @@ pub trait Element: bytemuck::Pod + std::str::FromStr {
 
 /// Something that yields values of any asked type: see [`Data::read_as`].
 pub(super) trait ReadValues {
-    fn values<T: Element>(self) -> Result<Vec<T>>;
+    fn values<T: Element>(self) -> Found<Vec<T>>;
+}
+
+/// The values of an array, or why there are none.
+pub(super) type Found<T> = std::result::Result<T, Fault>;
+
+/// Why an array has no values.
+#[derive(Debug)]
+pub(super) enum Fault {
+    /// It is not what its head says: whoever does not need it goes on without.
+    Unfit(String),
+    /// The file is damaged, or the system refused: the rest cannot be trusted either.
+    Fatal(Error),
+}
+
+impl From<Error> for Fault {
+    fn from(error: Error) -> Fault {
+        Fault::Fatal(error)
+    }
+}
+
+impl Fault {
+    /// The error where the file cannot do without the array.
+    pub(super) fn error(self) -> Error {
+        match self {
+            Fault::Unfit(reason) => broken(reason),
+            Fault::Fatal(error) => error,
+        }
+    }
+}
+
+/// A fault that only those who need the array must hear of, as its reason.
+pub(super) fn unless_fatal<T>(found: Found<T>) -> Result<std::result::Result<T, String>> {
+    match found {
+        Ok(values) => Ok(Ok(values)),
+        Err(Fault::Unfit(reason)) => Ok(Err(reason)),
+        Err(Fault::Fatal(error)) => Err(error),
+    }
 }
 
 macro_rules! kinds {
@@ -41,11 +79,11 @@ macro_rules! kinds {
         })*
 
         impl Data {
-            /// The values of `reader` in the type of that name, or `None` for an unknown name.
-            pub(super) fn read_as(name: &str, reader: impl ReadValues) -> Option<Result<Data>> {
+            /// The values of `reader` in the type of that name.
+            pub(super) fn read_as(name: &str, reader: impl ReadValues) -> Found<Data> {
                 match name {
-                    $($name => Some(reader.values::<$type>().map(Data::$variant)),)*
-                    _ => None,
+                    $($name => reader.values::<$type>().map(Data::$variant),)*
+                    _ => Err(Fault::Unfit(format!("its type '{name:.40}' is not one of numbers"))),
                 }
             }
 
@@ -68,6 +106,11 @@ macro_rules! kinds {
             /// of memory.
             pub fn to_f64(&self) -> Result<Vec<f64>> {
                 match self { $(Data::$variant(v) => exact(v),)* }
+            }
+
+            /// Keeps the tuples of so many components that are wanted.
+            pub(super) fn keep(&mut self, wanted: &[bool], components: usize) {
+                match self { $(Data::$variant(v) => keep(v, wanted, components),)* }
             }
 
             /// Appends the values of `more`; false if its type is another.
@@ -98,6 +141,41 @@ impl Data {
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
+
+    /// Appends the values of `more`, all as f64 where the types are two; false where f64 has not all of them.
+    pub(super) fn join(&mut self, more: &Data) -> Result<bool> {
+        if self.append(more)? {
+            return Ok(true);
+        }
+        let widened = self.to_f64().and_then(|mine| Ok((mine, more.to_f64()?)));
+        match widened {
+            Ok((mine, more)) => {
+                *self = Data::F64(mine);
+                self.append(&Data::F64(more))
+            }
+            Err(Error::BadElement { .. }) => Ok(false),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// Which of these bytes have none of the bits; `None` where they are no bytes.
+    pub(super) fn without_bits(&self, bits: u8) -> Result<Option<Vec<bool>>> {
+        let what = "the marks of ghosts";
+        Ok(Some(match self {
+            Data::U8(marks) => memory::collected(what, marks.iter().map(|m| m & bits == 0))?,
+            Data::I8(marks) => memory::collected(what, marks.iter().map(|m| *m as u8 & bits == 0))?,
+            _ => return Ok(None),
+        }))
+    }
+}
+
+/// Keeps the tuples of so many components that are wanted.
+pub(super) fn keep<T: Copy>(values: &mut Vec<T>, wanted: &[bool], components: usize) {
+    let mut at = 0;
+    values.retain(|_| {
+        at += 1;
+        wanted[(at - 1) / components]
+    });
 }
 
 fn exact<T: Element>(values: &[T]) -> Result<Vec<f64>> {

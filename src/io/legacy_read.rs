@@ -1,21 +1,23 @@
 //! Legacy `.vtk` files of points, ascii or binary, of every version: read from front to end, since only what comes before
-//! tells where the next section begins. Cells are stepped over.
+//! tells where the next section begins. As in VTK, what counts are words, in either case; lines end only the title, texts and
+//! what comes before binary values. Cells are stepped over.
 //!
 //! The format: <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>.
 
 use super::broken;
-use super::data::{Data, Element, ReadValues};
-use super::snapshot::{Field, Snapshot};
-use crate::error::Result;
+use super::data::{Data, Element, Fault, Found, ReadValues, unless_fatal};
+use super::snapshot::{Field, LONGEST_NOTE, LeftAside, Snapshot};
+use crate::error::{Error, Result};
 use crate::memory;
 
 pub fn read(bytes: &[u8]) -> Result<Snapshot> {
-    let mut reader = Reader { rest: bytes, binary: false, of: Of::File, found: Snapshot::default(), points: false };
+    let mut reader =
+        Reader { rest: bytes, binary: false, of: Of::File, found: Snapshot::default(), points: false, announced: None };
     reader.header()?;
-    while let Some(words) = reader.words()? {
-        reader.section(&words)?;
+    while let Some(word) = reader.word() {
+        reader.section(word)?;
     }
-    if reader.points { Ok(reader.found) } else { Err(broken("it has no points")) }
+    reader.whole()
 }
 
 /// What arrays belong to.
@@ -33,15 +35,47 @@ struct Reader<'a> {
     found: Snapshot,
     /// Whether there were any.
     points: bool,
+    /// A section that has to come yet.
+    announced: Option<&'static str>,
 }
+
+/// What no number can be taken for: an array that meets one of these has ended early.
+const KEYWORDS: &[&str] = &[
+    "DATASET",
+    "POINTS",
+    "VERTICES",
+    "LINES",
+    "POLYGONS",
+    "TRIANGLE_STRIPS",
+    "CELLS",
+    "CELL_TYPES",
+    "POINT_DATA",
+    "CELL_DATA",
+    "FIELD",
+    "SCALARS",
+    "COLOR_SCALARS",
+    "LOOKUP_TABLE",
+    "VECTORS",
+    "NORMALS",
+    "TENSORS",
+    "TENSORS6",
+    "TEXTURE_COORDINATES",
+    "GLOBAL_IDS",
+    "PEDIGREE_IDS",
+    "EDGE_FLAGS",
+    "METADATA",
+];
+
+/// Whatever holds values: what the data of points or cells begin with.
+const AN_ARRAY: &str = "an array";
 
 impl<'a> Reader<'a> {
     fn header(&mut self) -> Result<()> {
         let (_version, _title) = (self.line(), self.line());
-        self.binary = match self.line().to_ascii_uppercase().trim_ascii() {
-            b"ASCII" => false,
-            b"BINARY" => true,
-            _ => return Err(broken("its third line is neither ASCII nor BINARY")),
+        self.binary = match self.word() {
+            Some(word) if word.eq_ignore_ascii_case(b"ASCII") => false,
+            Some(word) if word.eq_ignore_ascii_case(b"BINARY") => true,
+            _ => return Err(broken("the word after its title is neither ASCII nor BINARY")),
         };
         Ok(())
     }
@@ -54,66 +88,106 @@ impl<'a> Reader<'a> {
         line
     }
 
-    /// The words of the next line that has any.
-    fn words(&mut self) -> Result<Option<Vec<&'a str>>> {
-        self.rest = self.rest.trim_ascii_start();
-        if self.rest.is_empty() {
-            return Ok(None);
-        }
-        let line = std::str::from_utf8(self.line()).map_err(|_| broken("a line of its text is not UTF-8"))?;
-        Ok(Some(line.split_ascii_whitespace().collect()))
+    fn word(&mut self) -> Option<&'a [u8]> {
+        let (word, rest) = first_word(self.rest);
+        self.rest = rest;
+        (!word.is_empty()).then_some(word)
     }
 
-    fn section(&mut self, words: &[&str]) -> Result<()> {
-        let keyword = words.first().unwrap_or(&"").to_ascii_uppercase();
-        match (keyword.as_str(), &words[1..]) {
-            ("DATASET", [kind]) => has_points(kind),
-            ("DIMENSIONS", [_, _, _]) => Ok(()),
-            ("POINTS", [n, kind]) => self.coordinates(number(n)?, kind),
-            ("VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS" | "CELLS", [n, size]) => {
-                self.cells(number(n)?, number(size)?)
+    fn text(&mut self) -> Result<String> {
+        let word = self.word().ok_or_else(|| broken("it ends within the head of a section"))?;
+        Ok(String::from_utf8_lossy(word).into_owned())
+    }
+
+    fn count(&mut self) -> Result<usize> {
+        number(&self.text()?)
+    }
+
+    fn next_is(&self, keyword: &str) -> bool {
+        first_word(self.rest).0.eq_ignore_ascii_case(keyword.as_bytes())
+    }
+
+    fn section(&mut self, word: &[u8]) -> Result<()> {
+        let keyword = String::from_utf8_lossy(word).to_ascii_uppercase();
+        if self.announced.is_some_and(|next| next == keyword || next == AN_ARRAY) {
+            self.announced = None;
+        }
+        match keyword.as_str() {
+            "DATASET" => has_points(&self.text()?),
+            "DIMENSIONS" => (0..3).try_for_each(|_| self.count().map(drop)),
+            "POINTS" => self.coordinates(),
+            "VERTICES" | "LINES" | "POLYGONS" | "TRIANGLE_STRIPS" => self.cells().map(drop),
+            "CELLS" => {
+                self.announced = (self.cells()? > 0).then_some("CELL_TYPES");
+                Ok(())
             }
-            ("CELL_TYPES", [n]) => self.values("int", number(n)?).map(drop),
-            ("POINT_DATA", [n]) => self.attributes(Of::Points, number(n)?),
-            ("CELL_DATA", [n]) => self.attributes(Of::Cells(number(n)?), 0),
-            ("FIELD", [_, n]) => self.fields(number(n)?),
-            ("SCALARS", [name, kind]) => self.scalars(name, kind, 1),
-            ("SCALARS", [name, kind, components]) => self.scalars(name, kind, number(components)?),
-            ("COLOR_SCALARS", [name, n]) => self.attribute(name, self.colour(), number(n)?),
-            ("LOOKUP_TABLE", [_, n]) => self.colours(number(n)?),
-            ("VECTORS" | "NORMALS", [name, kind]) => self.attribute(name, kind, 3),
-            ("TENSORS", [name, kind]) => self.attribute(name, kind, 9),
-            ("TENSORS6", [name, kind]) => self.attribute(name, kind, 6),
-            ("TEXTURE_COORDINATES", [name, n, kind]) => self.attribute(name, kind, number(n)?),
-            ("GLOBAL_IDS" | "PEDIGREE_IDS", [name, kind]) => self.attribute(name, kind, 1),
-            ("METADATA", []) => self.step_over_metadata(),
-            _ => Err(broken(format!("it has a line that cannot be understood: '{:.40}'", words.join(" ")))),
+            "CELL_TYPES" => {
+                let count = self.count()?;
+                self.step_over("int", count)
+            }
+            "POINT_DATA" => {
+                let n = self.count()?;
+                self.attributes(Of::Points, n)
+            }
+            "CELL_DATA" => {
+                let n = self.count()?;
+                self.attributes(Of::Cells(n), n)
+            }
+            "FIELD" => self.fields(),
+            "SCALARS" => self.scalars(),
+            "COLOR_SCALARS" => {
+                let (name, components) = (self.text()?, self.count()?);
+                self.attribute(&name, self.colour(), components)
+            }
+            "LOOKUP_TABLE" => {
+                let (_name, n) = (self.text()?, self.count()?);
+                self.step_over(self.colour(), product(n, 4)?)
+            }
+            "VECTORS" | "NORMALS" => self.typed(3),
+            "TENSORS" => self.typed(9),
+            "TENSORS6" => self.typed(6),
+            "TEXTURE_COORDINATES" => {
+                let (name, components, kind) = (self.text()?, self.count()?, self.text()?);
+                self.attribute(&name, &kind, components)
+            }
+            "GLOBAL_IDS" | "PEDIGREE_IDS" | "EDGE_FLAGS" => self.typed(1),
+            "METADATA" => {
+                self.step_over_metadata();
+                Ok(())
+            }
+            _ => Err(broken(format!("it has a word that cannot be understood: '{keyword:.40}'"))),
         }
     }
 
-    fn coordinates(&mut self, n: usize, kind: &str) -> Result<()> {
-        let data = self.values(kind, product(n, 3)?)?.ok_or_else(|| broken("its points are not numbers"))?;
+    fn coordinates(&mut self) -> Result<()> {
+        let (n, kind) = (self.count()?, self.text()?);
+        let data = unless_fatal(self.values(&kind, product(n, 3)?))?;
+        let data = data.map_err(|reason| broken(format!("its points: {reason}")))?;
         self.found.points = super::xml_read::coordinates(data)?;
         self.points = true;
         Ok(())
     }
 
     /// Two arrays with names since version 5, one list of counts and numbers before.
-    fn cells(&mut self, n: usize, size: usize) -> Result<()> {
-        if !self.next_is(b"OFFSETS") {
-            return self.values("int", size).map(drop);
+    fn cells(&mut self) -> Result<usize> {
+        let (n, size) = (self.count()?, self.count()?);
+        if !self.next_is("OFFSETS") {
+            return self.step_over("int", size).map(|()| n);
         }
-        for count in [n, size] {
-            match self.words()?.as_deref() {
-                Some(["OFFSETS" | "CONNECTIVITY", kind]) => self.values(kind, count)?,
-                _ => return Err(broken("its cells are not OFFSETS and CONNECTIVITY")),
-            };
+        for (keyword, count) in [("OFFSETS", n), ("CONNECTIVITY", size)] {
+            if !self.next_is(keyword) {
+                return Err(broken("its cells are not OFFSETS and CONNECTIVITY"));
+            }
+            let (_keyword, kind) = (self.word(), self.text()?);
+            self.step_over(&kind, count)?;
         }
-        Ok(())
+        Ok(n)
     }
 
     fn attributes(&mut self, of: Of, n: usize) -> Result<()> {
         self.of = of;
+        // Some writers end with an empty section for cells.
+        self.announced = (n > 0 && of == Of::Points).then_some(AN_ARRAY);
         match self.found.points.len() {
             points if of == Of::Points && n != points => {
                 Err(broken(format!("it has data of {n} points, not {points}")))
@@ -122,11 +196,33 @@ impl<'a> Reader<'a> {
         }
     }
 
-    fn scalars(&mut self, name: &str, kind: &str, components: usize) -> Result<()> {
-        if self.next_is(b"LOOKUP_TABLE") {
-            self.words()?;
+    /// The number of components may be left out, and so may, in what others than VTK write, the name of a table; a number
+    /// counts components if it stands on the line of the head, or before that name.
+    fn scalars(&mut self) -> Result<()> {
+        let (name, kind) = (self.text()?, self.text()?);
+        let mut components = 1;
+        if !self.next_is("LOOKUP_TABLE") && (self.is_within_line() || self.is_before("LOOKUP_TABLE")) {
+            components = self.count()?;
         }
-        self.attribute(name, kind, components)
+        if self.next_is("LOOKUP_TABLE") {
+            let (_keyword, _table) = (self.word(), self.text()?);
+        }
+        self.attribute(&name, &kind, components)
+    }
+
+    fn is_within_line(&self) -> bool {
+        let space = self.rest.iter().take_while(|b| is_space(b));
+        space.clone().count() < self.rest.len() && space.clone().all(|b| *b != b'\n')
+    }
+
+    /// Whether the word after the next is the keyword.
+    fn is_before(&self, keyword: &str) -> bool {
+        first_word(first_word(self.rest).1).0.eq_ignore_ascii_case(keyword.as_bytes())
+    }
+
+    fn typed(&mut self, components: usize) -> Result<()> {
+        let (name, kind) = (self.text()?, self.text()?);
+        self.attribute(&name, &kind, components)
     }
 
     /// An array with a value for each point or cell.
@@ -139,56 +235,64 @@ impl<'a> Reader<'a> {
         self.array(name, kind, components, n)
     }
 
-    fn fields(&mut self, n: usize) -> Result<()> {
+    fn fields(&mut self) -> Result<()> {
+        let (_name, n) = (self.text()?, self.count()?);
         for _ in 0..n {
-            let mut words = self.words()?;
-            while words.as_deref() == Some(&["METADATA"]) {
-                self.step_over_metadata()?;
-                words = self.words()?;
+            while self.next_is("METADATA") {
+                self.word();
+                self.step_over_metadata();
             }
-            match words.as_deref() {
-                Some([name, components, n, kind]) => self.array(name, kind, number(components)?, number(n)?)?,
-                _ => return Err(broken("a field has fewer arrays than it says")),
+            if self.next_is("NULL_ARRAY") {
+                self.word();
+                continue;
             }
+            let end = |_| broken("a field has fewer arrays than it says");
+            let name = self.text().map_err(end)?;
+            let (components, n) = (self.count()?, self.count()?);
+            let kind = self.text()?;
+            self.array(&name, &kind, components, n)?;
         }
         Ok(())
     }
 
     fn array(&mut self, name: &str, kind: &str, components: usize, n: usize) -> Result<()> {
         let (name, count) = (decoded(name), product(n, components)?);
-        if kind == "string" {
-            return self.texts(name, count);
+        if matches!(kind.to_ascii_lowercase().as_str(), "string" | "utf8_string" | "unicode_string" | "variant") {
+            return self.texts(name, kind, count);
         }
-        let data = self.values(kind, count)?;
-        match (self.of, data) {
-            (Of::Points, Some(data)) if n == self.found.points.len() && components > 0 => {
+        match (self.of, unless_fatal(self.values(kind, count))?) {
+            (Of::Points, Ok(data)) if n == self.found.points.len() && components > 0 => {
                 self.found.fields.push(Field { name, components, data });
             }
-            (Of::Points, Some(_)) => {
+            (Of::Points, Ok(_)) => {
                 let points = self.found.points.len();
-                return Err(broken(format!(
-                    "array '{name}' has {count} values, not {components} for each of {points} points"
-                )));
+                let reason = format!("it has {count} values, not {components} for each of {points} points");
+                self.found.left_aside.push(LeftAside { name, reason });
             }
-            (Of::Points, None) => log::warn!("array '{name}' is not of numbers: left aside"),
+            (Of::Points, Err(reason)) => self.found.left_aside.push(LeftAside { name, reason }),
             (Of::Cells(_), _) => self.found.of_cells.push(name),
-            (Of::File, Some(data)) if name == "TimeValue" => self.found.time = data.to_f64()?.first().copied(),
-            _ => {}
+            (Of::File, Ok(data)) => self.found.take_time(&name, &data),
+            (Of::File, Err(_)) => {}
         }
         Ok(())
     }
 
     /// Texts of the file are notes; those of points are left aside, as in VTK's XML files.
-    fn texts(&mut self, name: String, count: usize) -> Result<()> {
-        let mut lines = Vec::new();
-        for _ in 0..self.fits(count, 1)? {
-            let text = if self.binary { self.measured_text()? } else { self.line() };
-            if self.of == Of::File {
-                lines.push(decoded(&String::from_utf8_lossy(text)));
+    fn texts(&mut self, name: String, kind: &str, count: usize) -> Result<()> {
+        let measured = self.binary && !kind.eq_ignore_ascii_case("variant");
+        self.line();
+        let mut note = String::new();
+        for i in 0..self.fits(count, 1)? {
+            let text = if measured { self.measured_text()? } else { self.line() };
+            if self.of == Of::File && note.len() <= LONGEST_NOTE {
+                note.push_str(if i > 0 { "\n" } else { "" });
+                note.push_str(&decoded(&String::from_utf8_lossy(text.trim_ascii_end())));
             }
         }
-        if self.of == Of::File {
-            self.found.notes.push((name, lines.join("\n")));
+        match self.of {
+            Of::File => self.found.take_note(name, note),
+            Of::Points => self.found.left_aside.push(LeftAside { name, reason: "it holds texts, not numbers".into() }),
+            Of::Cells(_) => self.found.of_cells.push(name),
         }
         Ok(())
     }
@@ -205,33 +309,42 @@ impl<'a> Reader<'a> {
         self.take(usize::try_from(length).unwrap_or(usize::MAX))
     }
 
-    fn colours(&mut self, n: usize) -> Result<()> {
-        self.values(self.colour(), product(n, 4)?).map(drop)
-    }
-
     fn colour(&self) -> &'static str {
         if self.binary { "unsigned_char" } else { "float" }
     }
 
     /// What is known of an array ends at an empty line.
-    fn step_over_metadata(&mut self) -> Result<()> {
+    fn step_over_metadata(&mut self) {
+        self.line();
         while !self.line().trim_ascii().is_empty() {}
-        Ok(())
     }
 
-    fn next_is(&self, keyword: &[u8]) -> bool {
-        self.rest.get(..keyword.len()).is_some_and(|next| next.eq_ignore_ascii_case(keyword))
+    fn step_over(&mut self, kind: &str, count: usize) -> Result<()> {
+        unless_fatal(self.values(kind, count)).map(drop)
     }
 
-    /// So many values; none where they are bits.
-    fn values(&mut self, kind: &str, count: usize) -> Result<Option<Data>> {
-        if kind == "bit" {
-            let done =
-                if self.binary { self.take(count.div_ceil(8)).map(drop) } else { self.numbers::<u8>(count).map(drop) };
-            return done.map(|()| None);
+    /// So many values, of which the last is passed in any case.
+    fn values(&mut self, kind: &str, count: usize) -> Found<Data> {
+        if self.binary {
+            self.line();
         }
-        let data = Data::read_as(type_of(kind, self.binary), Values { reader: self, count });
-        data.unwrap_or_else(|| Err(broken(format!("type '{kind:.40}' is unknown")))).map(Some)
+        match kind.to_ascii_lowercase().as_str() {
+            "bit" if self.binary => self.take(count.div_ceil(8)).map(drop)?,
+            "bit" => self.numbers::<u8>(count).map(drop)?,
+            kind => match type_of(kind, self.binary) {
+                Some(name) => return Data::read_as(name, Values { reader: self, count }),
+                None if self.binary => {
+                    return Err(broken(format!(
+                        "type '{kind:.40}' is unknown, and so is where its values end; re-save it as .vtu"
+                    ))
+                    .into());
+                }
+                None => {
+                    return self.numbers::<f64>(count).and(Err(Fault::Unfit(format!("type '{kind:.40}' is unknown"))));
+                }
+            },
+        }
+        Err(Fault::Unfit("it holds bits, not numbers".into()))
     }
 
     /// The next so many bytes.
@@ -244,26 +357,30 @@ impl<'a> Reader<'a> {
     /// `count`, if so many things of at least `size` bytes can still come.
     fn fits(&self, count: usize, size: usize) -> Result<usize> {
         let there = self.rest.len() / size;
-        if count <= there { Ok(count) } else { Err(broken(format!("it ends before {count} values that it announces"))) }
+        if count <= there { Ok(count) } else { Err(ends_before(count)) }
     }
 
-    fn numbers<T: Element>(&mut self, count: usize) -> Result<Vec<T>> {
+    fn numbers<T: Element>(&mut self, count: usize) -> Found<Vec<T>> {
         // A number takes a character and, but for the last, a space.
         self.fits(count.saturating_sub(1), 2)?;
         let mut values = memory::reserved("an array of the file", count)?;
-        while values.len() < count {
-            self.rest = self.rest.trim_ascii_start();
-            let end = self.rest.iter().position(u8::is_ascii_whitespace).unwrap_or(self.rest.len());
-            let (word, rest) = self.rest.split_at(end);
-            let value = std::str::from_utf8(word).ok().and_then(|word| word.parse().ok());
-            let wrong = || match word {
-                [] => broken(format!("it ends before {count} values that it announces")),
-                _ => broken(format!("'{:.30}' is no {}", String::from_utf8_lossy(word), T::NAME)),
-            };
-            values.push(value.ok_or_else(wrong)?);
-            self.rest = rest;
+        let mut unfit = None;
+        for _ in 0..count {
+            let word = self.word().ok_or_else(|| ends_before(count))?;
+            match std::str::from_utf8(word).ok().and_then(|word| word.parse().ok()) {
+                Some(value) => values.push(value),
+                None if KEYWORDS.iter().any(|k| word.eq_ignore_ascii_case(k.as_bytes())) => {
+                    return Err(ends_before(count).into());
+                }
+                None => {
+                    unfit.get_or_insert(word);
+                }
+            }
         }
-        Ok(values)
+        match unfit {
+            None => Ok(values),
+            Some(word) => Err(Fault::Unfit(format!("'{:.30}' is no {}", String::from_utf8_lossy(word), T::NAME))),
+        }
     }
 
     fn big_endian<T: Element>(&mut self, count: usize) -> Result<Vec<T>> {
@@ -276,6 +393,17 @@ impl<'a> Reader<'a> {
         }
         Ok(values)
     }
+
+    /// What was found, unless the file was cut where a section ends.
+    fn whole(self) -> Result<Snapshot> {
+        match self.announced {
+            Some(next) => {
+                Err(broken(format!("it ends where {next} should begin: it was cut, or is still being written")))
+            }
+            None if !self.points => Err(broken("it has no points")),
+            None => self.found.settled(),
+        }
+    }
 }
 
 /// A request for the values of one array, whatever their type.
@@ -285,9 +413,25 @@ struct Values<'r, 'a> {
 }
 
 impl ReadValues for Values<'_, '_> {
-    fn values<T: Element>(self) -> Result<Vec<T>> {
-        if self.reader.binary { self.reader.big_endian(self.count) } else { self.reader.numbers(self.count) }
+    fn values<T: Element>(self) -> Found<Vec<T>> {
+        if self.reader.binary { Ok(self.reader.big_endian(self.count)?) } else { self.reader.numbers(self.count) }
     }
+}
+
+/// What C takes for white space.
+fn is_space(byte: &u8) -> bool {
+    matches!(byte, b' ' | b'\t'..=b'\r')
+}
+
+/// The first word, empty where there is none, and what follows it.
+fn first_word(bytes: &[u8]) -> (&[u8], &[u8]) {
+    let start = bytes.iter().position(|b| !is_space(b)).unwrap_or(bytes.len());
+    let bytes = &bytes[start..];
+    bytes.split_at(bytes.iter().position(is_space).unwrap_or(bytes.len()))
+}
+
+fn ends_before(count: usize) -> Error {
+    broken(format!("it ends before {count} values that it announces"))
 }
 
 fn has_points(kind: &str) -> Result<()> {
@@ -298,8 +442,8 @@ fn has_points(kind: &str) -> Result<()> {
 }
 
 /// The name that VTK's XML files have for a type; ids are shortened in binary files.
-fn type_of(kind: &str, binary: bool) -> &'static str {
-    match kind.to_ascii_lowercase().as_str() {
+fn type_of(kind: &str, binary: bool) -> Option<&'static str> {
+    Some(match kind {
         "vtkidtype" => {
             if binary {
                 "Int32"
@@ -313,12 +457,12 @@ fn type_of(kind: &str, binary: bool) -> &'static str {
         "unsigned_short" | "vtktypeuint16" => "UInt16",
         "int" | "vtktypeint32" => "Int32",
         "unsigned_int" | "vtktypeuint32" => "UInt32",
-        "long" | "vtktypeint64" => "Int64",
-        "unsigned_long" | "vtktypeuint64" => "UInt64",
+        "long" | "long_long" | "__int64" | "vtktypeint64" => "Int64",
+        "unsigned_long" | "unsigned_long_long" | "unsigned___int64" | "vtktypeuint64" => "UInt64",
         "float" | "vtktypefloat32" => "Float32",
         "double" | "vtktypefloat64" => "Float64",
-        _ => "",
-    }
+        _ => return None,
+    })
 }
 
 fn number(word: &str) -> Result<usize> {
@@ -364,11 +508,11 @@ mod tests {
         let good = read(TEXT.as_bytes()).unwrap();
         assert_eq!((good.points, &good.fields[0].data), (vec![[0.0, 1.0, 2.0]], &Data::F64(vec![7.0])));
         for (from, to, expected) in [
-            ("SCALARS T", "SCALARS T x", "cannot be understood: 'SCALARS T x double 1'"),
-            ("T double", "T complex", "type 'complex' is unknown"),
+            ("SCALARS T", "SCALARS T x", "'double' is no count"),
             ("\n7\n", "\n", "ends before 1 values"),
             ("\n7\n", "\n7 8\n", "cannot be understood: '8'"),
-            ("\n7\n", "\nseven\n", "'seven' is no Float64"),
+            ("\n7\n", "\nVECTORS v double 1 2 3\n", "ends before 1 values"),
+            ("SCALARS T double 1\nLOOKUP_TABLE default\n7\n", "", "ends where an array should begin"),
             ("POINT_DATA 1", "POINT_DATA 2", "data of 2 points, not 1"),
             ("POINT_DATA 1\n", "", "belongs neither to points nor to cells"),
             ("POINTS 1", "POINTS 99999999999999999999", "is no count"),
@@ -376,9 +520,38 @@ mod tests {
             ("UNSTRUCTURED_GRID", "STRUCTURED_POINTS", "save it as an unstructured grid"),
             ("ASCII", "ASKII", "neither ASCII nor BINARY"),
             ("POINTS 1 double", "POINTS 1 bit", "not numbers"),
+            ("0 1 2", "0 one 2", "'one' is no Float64"),
         ] {
             let error = read(TEXT.replace(from, to).as_bytes()).unwrap_err();
             assert!(error.name() == "BAD_FILE" && error.to_string().contains(expected), "{to}: {error}");
+        }
+    }
+
+    #[test]
+    fn a_file_cut_where_a_section_ends_is_refused() {
+        for (from, expected) in [("CELL_TYPES", "where CELL_TYPES should"), ("SCALARS", "where an array should")] {
+            let error = read(&TEXT.as_bytes()[..TEXT.find(from).unwrap()]).unwrap_err().to_string();
+            assert!(error.contains(expected), "{error}");
+        }
+    }
+
+    #[test]
+    fn an_array_that_is_no_numbers_is_left_aside() {
+        for (from, to, expected) in [
+            ("T double", "T complex", "type 'complex' is unknown"),
+            ("\n7\n", "\nseven\n", "'seven' is no Float64"),
+            (
+                "SCALARS T double 1\nLOOKUP_TABLE default\n7\n",
+                "FIELD f 1 T 1 2 double 1 2",
+                "2 values, not 1 for each of 1",
+            ),
+            ("SCALARS T double 1\nLOOKUP_TABLE default\n7\n", "FIELD f 2 T 1 1 int 1 T 1 1 int 2", "several arrays"),
+        ] {
+            let text = TEXT.replace(from, to) + "\nVECTORS v float\n1 2 3\n";
+            let got = read(text.as_bytes()).unwrap();
+            assert_eq!(got.field("v").unwrap().data, Data::F32(vec![1.0, 2.0, 3.0]), "{to}");
+            let error = got.usable("T").unwrap_err().to_string();
+            assert!(got.field("T").is_none() && error.contains(expected), "{to}: {error}");
         }
     }
 

@@ -4,7 +4,7 @@
 //! Sizes in a file are claims. Each is checked against the bytes that are there before memory is reserved for it.
 
 use super::broken;
-use super::data::Element;
+use super::data::{Element, Fault, Found};
 use crate::error::{Error, Result};
 use crate::memory;
 use std::borrow::Cow;
@@ -82,17 +82,17 @@ impl<'a> Payload<'a> {
     }
 
     /// The `count` values of an array.
-    pub fn values<T: Element>(self, layout: &Layout, count: usize) -> Result<Vec<T>> {
+    pub fn values<T: Element>(self, layout: &Layout, count: usize) -> Found<Vec<T>> {
         // Some writers give an empty array no bytes at all, not even its size.
         if count == 0 { Ok(Vec::new()) } else { self.decode(layout, Some(count)) }
     }
 
     /// All bytes of an array of text, whose length only its own size tells.
-    pub fn text(self, layout: &Layout) -> Result<Vec<u8>> {
+    pub fn text(self, layout: &Layout) -> Found<Vec<u8>> {
         self.decode(layout, None)
     }
 
-    fn decode<T: Element>(mut self, layout: &Layout, count: Option<usize>) -> Result<Vec<T>> {
+    fn decode<T: Element>(mut self, layout: &Layout, count: Option<usize>) -> Found<Vec<T>> {
         let mut values = match layout.compressor {
             None => self.plain(layout, count)?,
             Some(compressor) => self.blocks(layout, compressor, count)?,
@@ -103,7 +103,7 @@ impl<'a> Payload<'a> {
         Ok(values)
     }
 
-    fn plain<T: Element>(&mut self, layout: &Layout, count: Option<usize>) -> Result<Vec<T>> {
+    fn plain<T: Element>(&mut self, layout: &Layout, count: Option<usize>) -> Found<Vec<T>> {
         let bytes = self.words(layout, 1)?[0];
         let count = check_count::<T>(Some(bytes), count, "")?;
         self.has(bytes)?;
@@ -112,7 +112,7 @@ impl<'a> Payload<'a> {
         Ok(values)
     }
 
-    fn blocks<T: Element>(&mut self, layout: &Layout, compressor: Compressor, count: Option<usize>) -> Result<Vec<T>> {
+    fn blocks<T: Element>(&mut self, layout: &Layout, compressor: Compressor, count: Option<usize>) -> Found<Vec<T>> {
         let head = self.words(layout, 3)?;
         let (blocks, size, last) = (head[0], head[1], head[2]);
         let full = if last == 0 { blocks } else { blocks.saturating_sub(1) };
@@ -124,7 +124,7 @@ impl<'a> Payload<'a> {
         let packed = packed_sizes.iter().try_fold(0u64, |sum, &s| sum.checked_add(s)).unwrap_or(u64::MAX);
         self.has(packed)?;
         if bytes > layout.capacity(packed) {
-            return Err(broken(format!("{packed} bytes cannot unpack to {bytes}")));
+            return Err(broken(format!("{packed} bytes cannot unpack to {bytes}")).into());
         }
         let mut values = zeroed(count)?;
         let mut rest: &mut [u8] = bytemuck::cast_slice_mut(&mut values);
@@ -174,7 +174,7 @@ impl<'a> Payload<'a> {
 }
 
 /// The number of values in so many stored bytes, which must be the number expected, if one is.
-fn check_count<T>(stored: Option<u64>, expected: Option<usize>, claim: &str) -> Result<usize> {
+fn check_count<T>(stored: Option<u64>, expected: Option<usize>, claim: &str) -> Found<usize> {
     let size = size_of::<T>() as u64;
     let count = stored.filter(|b| b % size == 0).and_then(|b| usize::try_from(b / size).ok());
     match (count, expected) {
@@ -183,7 +183,7 @@ fn check_count<T>(stored: Option<u64>, expected: Option<usize>, claim: &str) -> 
         _ => {
             let stored = stored.map_or("an impossible number of".into(), |b| b.to_string());
             let wanted = expected.map_or(String::new(), |n| format!(" where {n} values of {size} are expected"));
-            Err(broken(format!("an array has {stored} bytes{claim}{wanted}")))
+            Err(Fault::Unfit(format!("it has {stored} bytes{claim}{wanted}")))
         }
     }
 }
@@ -266,7 +266,7 @@ mod tests {
     const ZLIB: Layout = Layout { compressor: Some(Compressor::Zlib), ..BARE };
 
     fn of<T: Element>(layout: &Layout, bytes: &[u8], count: usize) -> Result<Vec<T>> {
-        Payload::bare(bytes, bytes.len() as u64).values(layout, count)
+        Payload::bare(bytes, bytes.len() as u64).values(layout, count).map_err(Fault::error)
     }
 
     #[test]
@@ -275,7 +275,7 @@ mod tests {
             assert_eq!(Payload::base64(text.as_bytes()).values::<u8>(&BARE, 4).unwrap(), [1, 2, 3, 4], "{text}");
         }
         for text in ["", "BAAAAAECA", "BAAAAA==AQIDB===", "BAA?AAECAwQ=", "====", "BAAAAAECAwQ"] {
-            let error = Payload::base64(text.as_bytes()).values::<u8>(&BARE, 4).unwrap_err();
+            let error = Payload::base64(text.as_bytes()).values::<u8>(&BARE, 4).unwrap_err().error();
             assert_eq!(error.name(), "BAD_FILE", "{text}");
         }
     }

@@ -1,7 +1,7 @@
 //! A raw appended section is not XML, so an XML file is cut there: the head goes to the XML parser, the arrays are read
 //! from the file where they lie.
 
-use super::{broken, system};
+use super::{broken, system, xml};
 use crate::error::Result;
 use roxmltree::Document;
 use std::fs::File;
@@ -31,15 +31,16 @@ impl Split {
         file.rewind().map_err(system)?;
         let mut head = Vec::new();
         let Some(mark) = read_until(file, &mut head, 0, MARK)? else {
-            return Ok(Split { head: utf8(head)?, length, appended: Appended::None });
+            return Ok(Split { head: xml::text(head)?, length, appended: Appended::None });
         };
         let missing = || broken("its appended section has no beginning");
         let close = read_until(file, &mut head, mark, b">")?.ok_or_else(missing)?;
         let start = read_until(file, &mut head, close, b"_")?.ok_or_else(missing)? + 1;
         let after = head.split_off(start);
         head.truncate(close + 1);
-        let mut head = utf8(head)?;
-        let raw = match encoding(&head[mark..]) {
+        let tag = String::from_utf8_lossy(&head[mark..]).into_owned();
+        let mut head = xml::text(head)?;
+        let raw = match xml::attribute(&tag, "encoding") {
             Some("raw") => true,
             Some("base64") | None => false,
             Some(other) => return Err(broken(format!("appended encoding '{other}' is neither raw nor base64"))),
@@ -50,15 +51,8 @@ impl Split {
     }
 
     pub fn document(&self) -> Result<Document<'_>> {
-        Document::parse(&self.head).map_err(|e| broken(format!("its XML is wrong: {e}")))
+        xml::document(&self.head)
     }
-}
-
-/// The value of `encoding` in a start tag.
-fn encoding(tag: &str) -> Option<&str> {
-    let value = tag.split_once("encoding")?.1.trim_start().strip_prefix('=')?.trim_start();
-    let quote = value.chars().next().filter(|c| matches!(c, '"' | '\''))?;
-    value[1..].split(quote).next()
 }
 
 /// Reads on until `pattern` is found in `bytes`, not before `from`; its place, or `None` at the end of the file.
@@ -101,10 +95,6 @@ fn text_after(file: &mut File, mut text: Vec<u8>) -> Result<Vec<u8>> {
     Ok(text)
 }
 
-fn utf8(bytes: Vec<u8>) -> Result<String> {
-    String::from_utf8(bytes).map_err(|_| broken("it is no VTK file: its text is not UTF-8"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -120,12 +110,5 @@ mod tests {
             assert!(split.head.starts_with(&head) && split.document().is_ok());
             assert!(matches!(split.appended, Appended::Raw(place) if place == split.length - 3));
         }
-    }
-
-    #[test]
-    fn the_encoding_is_read_as_xml_has_it() {
-        assert_eq!(encoding("<AppendedData encoding=\"raw\">"), Some("raw"));
-        assert_eq!(encoding("<AppendedData  encoding\n= 'base64' >"), Some("base64"));
-        assert_eq!((encoding("<AppendedData>"), encoding("<AppendedData encoding=raw>")), (None, None));
     }
 }

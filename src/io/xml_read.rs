@@ -2,17 +2,18 @@
 //!
 //! The format: <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>.
 
-use super::data::{Data, Element, ReadValues, extend};
+use super::data::{Data, Element, Fault, Found, ReadValues, extend, unless_fatal};
 use super::payload::{Compressor, Layout, Payload};
-use super::snapshot::{Field, Snapshot};
+use super::snapshot::{Field, LeftAside, Snapshot};
 use super::split::{Appended, Split};
-use super::{broken, in_file, legacy, system};
+use super::{broken, in_file, system};
 use crate::error::{Error, Result};
 use roxmltree::Node;
 use std::cell::Cell;
+use std::collections::{HashMap, HashSet};
 use std::fs::File;
 use std::io::{Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Reads an open file; `path` is for its neighbours. The pieces of a parallel file are not `whole`: they cannot list
 /// further files, or a list of itself would have no end.
@@ -24,24 +25,27 @@ pub fn read(mut file: File, path: &Path, whole: bool) -> Result<Snapshot> {
     let kind = kind.ok_or_else(|| broken("it is no VTK file: there is no VTKFile element with a type"))?;
     let grid = root.children().find(|c| c.has_tag_name(kind));
     let grid = grid.ok_or_else(|| broken(format!("it has no {kind} element")))?;
+    let reader = || Ok::<_, Error>(Reader { file: &file, split: &split, layout: layout(root)?, taken: Cell::new(0) });
     match kind {
-        "UnstructuredGrid" | "PolyData" => {
-            Reader { file: &file, split: &split, layout: layout(root)?, taken: Cell::new(0) }.grid(grid)
+        "UnstructuredGrid" | "PolyData" => reader()?.grid(grid),
+        "StructuredGrid" if grid.children().filter(|c| c.has_tag_name("Piece")).count() > 1 => {
+            Err(broken("its pieces share points; save it as an unstructured grid, .vtu"))
         }
-        "PUnstructuredGrid" | "PPolyData" if whole => parallel(grid, path),
+        "StructuredGrid" => reader()?.grid(grid),
+        "PUnstructuredGrid" | "PPolyData" if whole => {
+            let mut snapshot = parallel(grid, path)?;
+            reader()?.about(grid, &mut snapshot)?;
+            Ok(snapshot)
+        }
         "PUnstructuredGrid" | "PPolyData" => Err(broken("a piece of a list is a list again")),
-        "Collection" => Err(broken("it is a list of files; read one of those, or open it as a series")),
+        "Collection" => Err(broken("it is a list of files; give one of those that it names")),
         "vtkMultiBlockDataSet" | "vtkPartitionedDataSet" | "vtkPartitionedDataSetCollection" => {
             Err(broken("it is a list of blocks; read the .vtu or .vtp of one of them"))
         }
         "ImageData" | "RectilinearGrid" | "PImageData" | "PRectilinearGrid" => {
             Err(broken(format!("the points of a {kind} are not in the file; save it as an unstructured grid, .vtu")))
         }
-        // vtkio aborts the process on a forged compressed file, so it never sees one.
-        _ if root.attributes().any(|a| a.name() == "compressor") => {
-            Err(broken(format!("a compressed {kind} is not supported; re-save it without compression")))
-        }
-        _ => legacy::read_xml(path),
+        _ => Err(broken(format!("a {kind} is not supported; save it as an unstructured grid, .vtu"))),
     }
 }
 
@@ -70,13 +74,24 @@ fn compressor(root: Node) -> Result<Option<Compressor>> {
 
 /// A parallel file lists the files of its pieces, which lie beside it.
 fn parallel(grid: Node, path: &Path) -> Result<Snapshot> {
-    let mut pieces = Vec::new();
-    for piece in grid.children().filter(|c| c.has_tag_name("Piece")) {
-        let source = piece.attribute("Source").ok_or_else(|| broken("a piece names no file"))?;
-        let source = super::atomic::folder_of(path).join(source);
-        pieces.push(super::read_any(&source, false).map_err(|e| in_file(&source, e))?);
+    let sources = grid.children().filter(|c| c.has_tag_name("Piece"));
+    let sources: Vec<PathBuf> = sources.map(|piece| source_of(piece, path)).collect::<Result<_>>()?;
+    let mut seen = HashSet::new();
+    if let Some(twice) = sources.iter().find(|source| !seen.insert(*source)) {
+        return Err(broken(format!("it names the piece {} twice; its particles are there once", twice.display())));
     }
-    join(pieces)
+    let read = |source: &PathBuf| super::read_any(source, false).map_err(|e| in_file(source, e));
+    join(sources.iter().map(read).collect::<Result<_>>()?)
+}
+
+/// Where the file of a piece is, with one name for each file.
+fn source_of(piece: Node, list: &Path) -> Result<PathBuf> {
+    let source = piece.attribute("Source").ok_or_else(|| broken("a piece names no file"))?;
+    let folder = super::atomic::folder_of(list);
+    // Lists from Windows have its separators.
+    let path = [source, &source.replace('\\', "/")].map(|name| folder.join(name)).into_iter().find(|p| p.exists());
+    let path = path.unwrap_or_else(|| folder.join(source));
+    path.canonicalize().map_err(|e| in_file(&path, system(e)))
 }
 
 struct Reader<'a> {
@@ -102,88 +117,128 @@ impl Reader<'_> {
     fn grid(&self, grid: Node) -> Result<Snapshot> {
         let pieces = grid.children().filter(|c| c.has_tag_name("Piece"));
         let mut snapshot = join(pieces.map(|piece| self.piece(piece)).collect::<Result<_>>()?)?;
-        for array in arrays(grid, "FieldData") {
-            match array.attribute("Name").unwrap_or_default() {
-                "TimeValue" => snapshot.time = self.data(array, 1)?.to_f64()?.first().copied(),
-                name => snapshot.notes.extend(self.note(array)?.map(|text| (name.to_string(), text))),
-            }
-        }
+        self.about(grid, &mut snapshot)?;
         Ok(snapshot)
     }
 
+    /// What belongs to the whole file: its time and its texts.
+    fn about(&self, grid: Node, snapshot: &mut Snapshot) -> Result<()> {
+        let times = || grid.attribute("TimeValues").unwrap_or_default().split_ascii_whitespace();
+        if let Some(first) = times().next() {
+            snapshot.time = first.parse().ok().filter(|t: &f64| t.is_finite());
+            if times().nth(1).is_some() {
+                let count = times().count();
+                snapshot.remarks.push(format!("it holds {count} time steps: the first is read, t = {first}"));
+            }
+        }
+        for array in arrays(grid, "FieldData") {
+            let name = array.attribute("Name").unwrap_or_default();
+            if matches!(name, "TimeValue" | "TIME") {
+                let one = self.data(array, 1);
+                let time = unless_fatal(one)?.map_err(|reason| snapshot.remarks.push(format!("{name}: {reason}")));
+                time.into_iter().for_each(|time| snapshot.take_time(name, &time));
+            } else if let Some(text) = self.note(array)? {
+                snapshot.take_note(name.to_string(), text);
+            }
+        }
+        Ok(())
+    }
+
     fn piece(&self, piece: Node) -> Result<Snapshot> {
-        let n = number(piece, "NumberOfPoints")?.ok_or_else(|| broken("a piece has no NumberOfPoints"))?;
+        let n = points_of(piece)?;
         let points = match arrays(piece, "Points").next() {
-            Some(array) => self.field(array, n)?,
+            Some(array) => self.field(array, n).map_err(|fault| in_array(array, fault.error()))?,
             None if n == 0 => Field { name: String::new(), components: 3, data: Data::F64(Vec::new()) },
             None => return Err(broken("a piece has no Points")),
         };
         if points.components != 3 {
             return Err(broken(format!("its points have {} coordinates, not 3", points.components)));
         }
-        let numeric = |a: &Node| {
-            let is = a.has_tag_name("DataArray") && !matches!(a.attribute("type"), Some("String" | "Bit"));
-            if !is {
-                log::warn!("array '{}' is not of numbers: left aside", a.attribute("Name").unwrap_or_default());
-            }
-            is
-        };
-        let fields = arrays(piece, "PointData").filter(numeric).map(|array| self.field(array, n));
-        let fields = fields.collect::<Result<_>>()?;
         let name = |a: Node| a.attribute("Name").unwrap_or_default().to_string();
         let of_cells = arrays(piece, "CellData").map(name).collect();
-        Ok(Snapshot { points: coordinates(points.data)?, fields, of_cells, ..Snapshot::default() })
+        let mut found = Snapshot { points: coordinates(points.data)?, of_cells, ..Snapshot::default() };
+        for array in arrays(piece, "PointData") {
+            match unless_fatal(self.field(array, n))? {
+                Ok(field) => found.fields.push(field),
+                Err(reason) => found.left_aside.push(LeftAside { name: name(array), reason }),
+            }
+        }
+        found.settled()
     }
 
-    fn field(&self, array: Node, n: usize) -> Result<Field> {
+    fn field(&self, array: Node, n: usize) -> Found<Field> {
         let name = array.attribute("Name").unwrap_or_default().to_string();
-        let components = number(array, "NumberOfComponents")?.unwrap_or(1);
-        let count = n.checked_mul(components).filter(|_| components > 0);
-        let count = count.ok_or_else(|| broken(format!("array '{name}' cannot have {n} tuples of {components}")))?;
+        let unfit = || Fault::Unfit(format!("it cannot have the components of its head for each of {n} points"));
+        let components = number(array, "NumberOfComponents").map_err(|_| unfit())?.unwrap_or(1);
+        let count = n.checked_mul(components).filter(|_| components > 0).ok_or_else(unfit)?;
         Ok(Field { name, components, data: self.data(array, count)? })
     }
 
-    fn data(&self, array: Node, count: usize) -> Result<Data> {
-        let kind = array.attribute("type").unwrap_or_default();
-        let data = Data::read_as(kind, Array { reader: self, array, count });
-        let data = data.unwrap_or_else(|| Err(broken(format!("type '{kind}' is unknown"))));
-        data.map_err(|e| in_array(array, e))
+    fn data(&self, array: Node, count: usize) -> Found<Data> {
+        let kind = match array.has_tag_name("DataArray") {
+            true => array.attribute("type").unwrap_or_default(),
+            false => array.tag_name().name(), // an Array of texts or such
+        };
+        Data::read_as(kind, Array { reader: self, array, count }).map_err(|fault| match fault {
+            Fault::Fatal(error) => Fault::Fatal(in_array(array, error)),
+            unfit => unfit,
+        })
     }
 
     /// The text of an array of characters; `None` for any other array.
     fn note(&self, array: Node) -> Result<Option<String>> {
-        let ascii = matches!(array.attribute("format"), Some("ascii") | None);
-        let bytes = match array.attribute("type") {
-            Some("Int8" | "String") if ascii => {
-                let codes = text_of(array).split_ascii_whitespace().map(|c| c.parse::<i16>().map(|c| c as u8));
-                codes.collect::<std::result::Result<_, _>>().map_err(|_| broken("a text is not in character codes"))
-            }
-            Some("Int8" | "String") => self.payload(array).and_then(|p| p.text(&self.layout)),
-            _ => return Ok(None),
+        if !matches!(array.attribute("type"), Some("Int8" | "String")) {
+            return Ok(None);
+        }
+        let bytes = match self.payload(array)? {
+            Some(payload) => unless_fatal(payload.text(&self.layout))?,
+            None => codes(text_of(array)),
         };
-        let bytes: Vec<u8> = bytes.map_err(|e| in_array(array, e))?;
+        let Ok(bytes) = bytes else { return Ok(None) };
         self.take(bytes.len(), 1)?;
         // VTK ends each of several strings with a NUL.
         Ok(String::from_utf8(bytes).ok().map(|text| text.trim_end_matches('\0').replace('\0', "\n")))
     }
 
-    fn payload<'p>(&'p self, array: Node<'p, '_>) -> Result<Payload<'p>> {
-        if array.attribute("format") == Some("binary") {
-            return Ok(Payload::base64(text_of(array).trim().as_bytes()));
-        }
-        let offset = number(array, "offset")?.ok_or_else(|| broken("it has no offset"))?;
+    /// The bytes of an array; none where it is in digits. As in VTK, an offset says that they are appended, "binary" that
+    /// they are in base64, and anything else is not looked at.
+    fn payload<'p>(&'p self, array: Node<'p, '_>) -> Result<Option<Payload<'p>>> {
+        let Some(offset) = number(array, "offset")? else {
+            let binary = array.attribute("format") == Some("binary");
+            return Ok(binary.then(|| Payload::base64(text_of(array).trim().as_bytes())));
+        };
         let outside = || broken(format!("its offset {offset} lies outside the file"));
         match &self.split.appended {
             Appended::None => Err(broken("the file has no appended section")),
-            Appended::Base64(text) => text.get(offset..).map(Payload::base64).ok_or_else(outside),
+            Appended::Base64(text) => text.get(offset..).map(Payload::base64).map(Some).ok_or_else(outside),
             Appended::Raw(start) => {
                 let place = start.checked_add(offset as u64).filter(|p| p <= &self.split.length).ok_or_else(outside)?;
                 let mut file = self.file;
                 file.seek(SeekFrom::Start(place)).map_err(system)?;
-                Ok(Payload::bare(file, self.split.length - place))
+                Ok(Some(Payload::bare(file, self.split.length - place)))
             }
         }
     }
+}
+
+/// A text as its characters' codes.
+fn codes(text: &str) -> std::result::Result<Vec<u8>, String> {
+    let codes = text.split_ascii_whitespace().map(|c| c.parse::<i16>().map(|c| c as u8));
+    codes.collect::<std::result::Result<_, _>>().map_err(|e| e.to_string())
+}
+
+/// The number of points of a piece; a structured one has its extent in place of a count.
+fn points_of(piece: Node) -> Result<usize> {
+    if let Some(n) = number(piece, "NumberOfPoints")? {
+        return Ok(n);
+    }
+    let extent = piece.attribute("Extent").ok_or_else(|| broken("a piece has neither NumberOfPoints nor Extent"))?;
+    let ends = extent.split_ascii_whitespace().map(|end| end.parse::<i64>().ok()).collect::<Option<Vec<_>>>();
+    let along = |ends: &[i64; 2]| ends[1].checked_sub(ends[0])?.checked_add(1)?.try_into().ok();
+    let n = ends
+        .filter(|ends| ends.len() == 6)
+        .and_then(|ends| ends.as_chunks().0.iter().try_fold(1usize, |n, ends| n.checked_mul(along(ends)?)));
+    n.ok_or_else(|| broken(format!("Extent '{extent:.60}' is not that of a grid")))
 }
 
 /// A request for the values of one array, whatever their type.
@@ -194,41 +249,36 @@ struct Array<'r, 'a, 'input> {
 }
 
 impl ReadValues for Array<'_, '_, '_> {
-    fn values<T: Element>(self) -> Result<Vec<T>> {
-        match self.array.attribute("format") {
-            Some("ascii") | None => ascii(text_of(self.array), self.count),
-            Some("binary" | "appended") => {
+    fn values<T: Element>(self) -> Found<Vec<T>> {
+        match self.reader.payload(self.array)? {
+            None => ascii(text_of(self.array), self.count),
+            Some(payload) => {
                 self.reader.take(self.count, size_of::<T>())?;
-                self.reader.payload(self.array)?.values(&self.reader.layout, self.count)
+                payload.values(&self.reader.layout, self.count)
             }
-            Some(other) => Err(broken(format!("format '{other}' is unknown"))),
         }
     }
 }
 
-fn ascii<T: Element>(text: &str, count: usize) -> Result<Vec<T>> {
-    // A number takes a character and a space.
-    if count > text.len() / 2 + 1 {
-        return Err(broken(format!("{count} numbers do not fit into {} characters", text.len())));
-    }
-    let mut values = crate::memory::reserved("an array of the file", count)?;
+fn ascii<T: Element>(text: &str, count: usize) -> Found<Vec<T>> {
+    // A number takes a character and a space: there are no more than so many, whatever the count.
+    let mut values = crate::memory::reserved("an array of the file", count.min(text.len() / 2 + 1))?;
     for word in text.split_ascii_whitespace() {
         if values.len() == count {
-            return Err(broken(format!("it has more than {count} numbers")));
+            return Err(Fault::Unfit(format!("it has more than {count} numbers")));
         }
-        values.push(word.parse().map_err(|_| broken(format!("'{word:.30}' is no {}", T::NAME)))?);
+        values.push(word.parse().map_err(|_| Fault::Unfit(format!("'{word:.30}' is no {}", T::NAME)))?);
     }
     match values.len() {
         n if n == count => Ok(values),
-        n => Err(broken(format!("it has {n} numbers where {count} are expected"))),
+        n => Err(Fault::Unfit(format!("it has {n} numbers where {count} are expected"))),
     }
 }
 
 pub(super) fn coordinates(data: Data) -> Result<Vec<[f64; 3]>> {
     let flat = match data {
         Data::F64(flat) => flat,
-        Data::F32(_) => data.to_f64()?,
-        other => return Err(broken(format!("its points are {}, not floating-point numbers", other.type_name()))),
+        other => other.to_f64()?,
     };
     match bytemuck::try_cast_vec(flat) {
         Ok(points) => Ok(points),
@@ -239,28 +289,48 @@ pub(super) fn coordinates(data: Data) -> Result<Vec<[f64; 3]>> {
     }
 }
 
-/// One cloud from the pieces of a file, in their order.
+/// One cloud from the pieces of a file, in their order, with the arrays that all of them have.
 fn join(pieces: Vec<Snapshot>) -> Result<Snapshot> {
     // A piece without points often comes without arrays; it matters only if there is no other.
     let all_empty = pieces.iter().all(|p| p.points.is_empty());
+    let ghosts = pieces.iter().map(|p| p.ghosts).sum();
     let mut pieces = pieces.into_iter().filter(|p| all_empty || !p.points.is_empty());
     let mut whole = pieces.next().unwrap_or_default();
     for piece in pieces {
         extend(&mut whole.points, &piece.points)?;
-        for field in &mut whole.fields {
-            let same = piece.field(&field.name).filter(|f| f.components == field.components);
-            let joined = same.map_or(Ok(false), |f| field.data.append(&f.data))?;
-            if !joined && !all_empty {
-                return Err(broken(format!("array '{}' is not the same in all pieces", field.name)));
+        let mut others: HashMap<String, Field> = piece.fields.into_iter().map(|f| (f.name.clone(), f)).collect();
+        let mut apart = piece.left_aside;
+        for mut field in std::mem::take(&mut whole.fields) {
+            let other = others.remove(&field.name).filter(|other| other.components == field.components);
+            match other.map_or(Ok(false), |other| field.data.join(&other.data))? {
+                true => whole.fields.push(field),
+                false => apart.push(not_everywhere(field.name)),
             }
         }
+        apart.extend(others.into_keys().map(not_everywhere));
+        whole.left_aside.extend(apart);
+        whole.remarks.extend(piece.remarks);
     }
-    Ok(whole)
+    let mut seen = HashSet::new();
+    whole.left_aside.retain(|l| seen.insert(l.name.clone()));
+    whole.remarks.dedup();
+    Ok(Snapshot { ghosts, ..whole })
 }
 
-/// The arrays in the sections of that name.
+fn not_everywhere(name: String) -> LeftAside {
+    LeftAside { name, reason: "it is not the same in all pieces".into() }
+}
+
+/// The arrays in the sections of that name, of several time steps those of the first.
 fn arrays<'a, 'input: 'a>(parent: Node<'a, 'input>, section: &'static str) -> impl Iterator<Item = Node<'a, 'input>> {
-    parent.children().filter(move |c| c.has_tag_name(section)).flat_map(|s| s.children().filter(Node::is_element))
+    let sections = parent.children().filter(move |c| c.has_tag_name(section));
+    sections.flat_map(|s| s.children().filter(|array| array.is_element() && is_of_first_step(*array)))
+}
+
+/// Steps are numbered where the grid gives their times.
+fn is_of_first_step(array: Node) -> bool {
+    let is_first = |steps: &str| steps.split_ascii_whitespace().any(|step| step == "0");
+    array.attribute("TimeStep").is_none_or(is_first) || !array.ancestors().any(|a| a.has_attribute("TimeValues"))
 }
 
 fn number(node: Node, attribute: &str) -> Result<Option<usize>> {
@@ -289,8 +359,9 @@ mod tests {
             ("ImageData", "save it as an unstructured grid"),
             ("PRectilinearGrid", "save it as an unstructured grid"),
             ("vtkMultiBlockDataSet", "read the .vtu or .vtp of one"),
-            ("StructuredGrid", "re-save it without compression"),
-            ("Collection", "open it as a series"),
+            ("PStructuredGrid", "save it as an unstructured grid"),
+            ("Table", "save it as an unstructured grid"),
+            ("Collection", "give one of those that it names"),
         ] {
             let path = dir.path().join(kind);
             let text =

@@ -288,27 +288,6 @@ mod tests {
     }
 
     #[test]
-    fn vtkio_reads_the_same_from_our_base64() {
-        use vtkio::model::{Attribute, DataSet, Piece, Vtk};
-        let snapshot = samples::cloud(1000);
-        let mut file = io::Cursor::new(Vec::new());
-        write(&mut file, &snapshot.view(), ALL[2]).unwrap();
-        let vtk = Vtk::parse_xml(&file.get_ref()[..]).unwrap();
-        let DataSet::UnstructuredGrid { pieces, .. } = vtk.data else { panic!("{:?}", vtk.data) };
-        let [Piece::Inline(piece)] = &pieces[..] else { panic!("not one piece") };
-        assert_eq!(piece.points.clone().into_vec::<f64>().unwrap(), snapshot.points.as_flattened());
-        assert_eq!(piece.cells.types, vec![vtkio::model::CellType::Vertex; 1000]);
-        assert_eq!(piece.data.point.len(), snapshot.fields.len());
-        for (attribute, field) in piece.data.point.iter().zip(&snapshot.fields) {
-            let Attribute::DataArray(array) = attribute else { panic!("{attribute:?}") };
-            assert_eq!((&array.name, array.num_comp()), (&field.name, field.components));
-            let bytes = |data: &super::super::Data| data.values().bytes().unwrap();
-            let theirs = super::super::legacy::data(array.data.clone()).unwrap();
-            assert!(theirs.type_name() == field.data.type_name() && bytes(&theirs) == bytes(&field.data));
-        }
-    }
-
-    #[test]
     fn a_full_disk_leaves_the_old_file() {
         struct Full(io::Cursor<Vec<u8>>);
         impl Write for Full {

@@ -5,6 +5,7 @@ use super::restart::{self, Notes};
 use super::{Solver, check, expect};
 use crate::array::Strided;
 use crate::error::{Error, Result};
+use crate::io::atomic::Prepared;
 use crate::io::{self, Column, Field, Options, Series, Snapshot, Values, View};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, INPUTS};
@@ -31,7 +32,10 @@ impl Solver {
     /// # Errors
     /// As [`Solver::write_vtk`]; `UnknownWord` for a quantity that does not exist.
     pub fn write_vtk_with(&mut self, path: impl AsRef<Path>, options: Options, extra: &[&str]) -> Result<()> {
-        let path = path.as_ref();
+        self.prepare_vtk(path.as_ref(), options, extra)?.publish()
+    }
+
+    fn prepare_vtk(&mut self, path: &Path, options: Options, extra: &[&str]) -> Result<Prepared> {
         let legacy = match ending(path).as_str() {
             "vtu" => false,
             "vtk" => true,
@@ -44,25 +48,25 @@ impl Solver {
         self.state.refuse_lost("write_vtk", 0..INPUTS)?;
         let mut fields = Vec::new();
         for name in self.columns(extra) {
-            let components = if fields::field(name)?.vector { self.dim() } else { 1 };
-            fields.push((name, components, self.get_all(name)?));
+            fields.push((name, fields::field(name)?.vector, self.get_all(name)?));
         }
         let (n, dim, x) = (self.len(), self.dim(), self.get_all("x")?);
-        let frame = self.frame.clone();
-        let points = Values::computed(3 * n, move |first, block: &mut [f64]| {
-            for (k, value) in block.iter_mut().enumerate() {
-                let (i, axis) = ((first + k) / 3, (first + k) % 3);
-                *value = frame.outward(&x[i * dim..(i + 1) * dim], axis);
-            }
-        });
+        let frame = &self.frame;
+        let points = in_space(&x, dim, |point, axis| frame.outward(point, axis));
         let column = |name, components, values| Column { name: Cow::Borrowed(name), components, values };
-        let mut fields: Vec<Column> = fields.iter().map(|(name, c, v)| column(*name, *c, Values::stored(v))).collect();
+        let columns = fields.iter().map(|(name, vector, v)| match vector {
+            true if *name == "x" => column(name, 3, in_space(v, dim, |point, axis| frame.outward(point, axis))),
+            // Other tools take two components for no vector.
+            true => column(name, 3, in_space(v, dim, |vector, axis| frame.outward_vector(vector, axis))),
+            false => column(name, 1, Values::stored(v)),
+        });
+        let mut fields: Vec<Column> = columns.collect();
         if self.state.last_h.len() == n && n > 0 && !legacy {
             fields.push(column(restart::H_START, 1, Values::stored(&self.state.last_h)));
         }
         let notes = self.notes().into_iter().map(|(name, text)| (name.into(), text.into())).collect();
         let view = View { n, points, fields, time: Some(self.state.time), notes };
-        if legacy { io::write_legacy(path, &view) } else { io::write_vtu(path, &view, options) }
+        if legacy { io::prepare_legacy(path, &view) } else { io::prepare_vtu(path, &view, options) }
     }
 
     /// The quantities of a snapshot: what is always there, what was given per particle, and `extra`.
@@ -96,21 +100,20 @@ impl Solver {
         if ending(list) != "pvd" {
             return Err(Error::bad("pvd_path", format!("'{}'", list.display()), "its name must end in .pvd"));
         }
-        let mut series = Series::open_or_create(list)?;
-        let path = series.next_file(self.state.time);
-        let replaced = path.exists();
-        self.write_vtk(&path)?;
-        series.append(self.state.time, &path).inspect_err(|_| {
-            if !replaced {
-                let _ = std::fs::remove_file(&path); // nobody will find it without the list
-            }
-        })?;
-        Ok(path)
+        self.write_in(&mut Series::open_or_create(list)?, Options::default(), &[])
+    }
+
+    /// The same for a list that is open, as [`Solver::write_vtk_with`] writes.
+    ///
+    /// # Errors
+    /// As [`Solver::write_vtk_with`].
+    pub fn write_in(&mut self, series: &mut Series, options: Options, extra: &[&str]) -> Result<PathBuf> {
+        series.write(self.state.time, |path| self.prepare_vtk(path, options, extra))
     }
 
     /// Particles from a VTK file. From a snapshot of ours: all that it holds, in place of what was set before, so that the
     /// solver goes on as the one that wrote it; its words and callbacks stay. From the file of another program: positions,
-    /// every array that has the name of an input, and the time if there is one. Where fewer than three dimensions are
+    /// every array of one component that has the name of an input, and the time if there is one. Where fewer than three dimensions are
     /// filled, they may be along any axes.
     ///
     /// # Errors
@@ -138,8 +141,10 @@ impl Solver {
         let mut found = Vec::new();
         for (slot, input) in FIELDS[..INPUTS].iter().enumerate() {
             let wanted = notes.as_ref().is_none_or(|notes| notes.arrays.contains(&slot));
-            match snapshot.field(input.name).filter(|_| wanted) {
-                Some(field) => found.push((slot, doubles(field)?)),
+            // An array of vectors is not the quantity of that name.
+            let field = if wanted { snapshot.usable(input.name)?.filter(|f| f.components == 1) } else { None };
+            match field {
+                Some(field) => found.push((slot, field.data.to_f64()?)),
                 None if notes.is_some() && wanted => return Err(lacks(input.name)),
                 None => {}
             }
@@ -153,7 +158,7 @@ impl Solver {
         let Some(notes) = notes else {
             let domain = self.state.domain.clone();
             let has_t = found.iter().any(|(slot, _)| *slot == fields::T);
-            let u = snapshot.field("u").filter(|_| !has_t).map(doubles).transpose()?;
+            let u = if has_t { None } else { snapshot.usable("u")?.map(doubles).transpose()? };
             u.iter().try_for_each(|u| check(fields::T, "u", &Strided::packed(u), n))?;
             let energy = u.as_ref().map(|u| Offered::Each(Strided::packed(u)));
             self.state.accept(&Offer { domain, x, given: &given, energy, anew: false })?;
@@ -163,7 +168,7 @@ impl Solver {
         };
         self.refuse_missing_functions(&notes)?;
         let array = |name: &str, like: usize| {
-            let values = snapshot.field(name).map(doubles).transpose()?;
+            let values = snapshot.usable(name)?.map(doubles).transpose()?;
             values.map(|values| check(like, name, &Strided::packed(&values), n).map(|()| values)).transpose()
         };
         let last_h = array(restart::H_START, fields::H)?.unwrap_or_default();
@@ -197,6 +202,15 @@ impl Solver {
     pub fn frame(&self) -> &Frame {
         &self.frame
     }
+}
+
+/// The three components that a file has for each `dim` of the solver.
+fn in_space<'a>(v: &'a [f64], dim: usize, component: impl Fn(&[f64], usize) -> f64 + 'a) -> Values<'a> {
+    Values::computed(v.len() / dim * 3, move |first, block: &mut [f64]| {
+        for (k, value) in (first..).zip(block) {
+            *value = component(&v[k / 3 * dim..][..dim], k % 3);
+        }
+    })
 }
 
 fn doubles(field: &Field) -> Result<Vec<f64>> {

@@ -62,6 +62,11 @@ impl Frame {
         self.axes.iter().position(|&a| a == axis).map_or(self.rest[axis], |at| point[at])
     }
 
+    /// One component of a vector, as a file has it.
+    pub fn outward_vector(&self, vector: &[f64], axis: usize) -> f64 {
+        self.axes.iter().position(|&a| a == axis).map_or(0.0, |at| vector[at])
+    }
+
     pub fn dim(&self) -> usize {
         self.axes.len()
     }

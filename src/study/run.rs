@@ -219,10 +219,8 @@ impl Writer {
             return Ok(());
         }
         let start = Instant::now();
-        let file = self.series.next_file(solver.get_number("time")?);
         let extra: Vec<&str> = self.output.fields.iter().map(String::as_str).collect();
-        solver.write_vtk_with(&file, self.output.encoding.into(), &extra)?;
-        self.series.append(solver.get_number("time")?, &file)?;
+        solver.write_in(&mut self.series, self.output.encoding.into(), &extra)?;
         self.count += 1;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())

@@ -2,11 +2,11 @@
 
 use super::keys::explain;
 use crate::error::{Error, Result};
-use crate::io::{Encoding, Options};
+use crate::io::{self, Encoding, Options};
 use crate::words::replaced;
 use serde::Deserialize;
 use std::collections::BTreeMap;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::sync::Arc;
 
 #[derive(Debug, Clone, Deserialize)]
@@ -165,12 +165,9 @@ impl Scene {
     /// Reads a scene file.
     ///
     /// # Errors
-    /// `Io`; otherwise as [`Scene::parse`].
+    /// `Io`, `BadFile`; otherwise as [`Scene::parse`].
     pub fn read(path: &Path) -> Result<Scene> {
-        let text = std::fs::read_to_string(path);
-        let name = path.display().to_string();
-        let text = text.map_err(|e| Error::Io { path: name.clone(), reason: format!("cannot read it: {e}") })?;
-        Scene::parse(&name, &text)
+        Scene::parse(&path.display().to_string(), &io::words(path)?)
     }
 
     /// Reads a scene; `name` names it in errors.
@@ -206,6 +203,13 @@ impl Scene {
         match &self.output {
             Some(Output { pvd, .. }) if pvd.extension().is_none_or(|e| e != "pvd") => {
                 Err(Error::bad("output.pvd", format!("'{}'", pvd.display()), "its name must end in .pvd"))
+            }
+            Some(Output { pvd, .. })
+                if !pvd.components().all(|c| matches!(c, Component::Normal(_) | Component::CurDir)) =>
+            {
+                let rule =
+                    "it must lie in the folder of the output, --out: a path without .. that does not begin with /";
+                Err(Error::bad("output.pvd", format!("'{}'", pvd.display()), rule))
             }
             Some(output) if output.every == 0 => Err(Error::bad("output.every", 0, "it must be at least 1")),
             _ => Ok(()),
@@ -281,6 +285,8 @@ mod tests {
             ("[time]\nend = 1", "", "missing field `time`"),
             ("T = 1", "T = ", "line 9"),
             ("end = 1", "end = 1\n[output]\npvd = \"..\"", "end in .pvd"),
+            ("end = 1", "end = 1\n[output]\npvd = \"../a.pvd\"", "folder of the output"),
+            ("end = 1", "end = 1\n[output]\npvd = \"/tmp/a.pvd\"", "folder of the output"),
         ] {
             let text = complaint(&SMALL.replace(from, to));
             assert!(text.contains(expected), "{to}: {text}");

@@ -5,7 +5,7 @@ use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
 use super::{choose, glass, lattice, surface};
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::io::{self, Snapshot};
+use crate::io::{self, LeftAside, Snapshot};
 use crate::model::conductivity::LAWS;
 use crate::model::fields::{self, NUMBERS};
 use crate::solver::Solver;
@@ -121,7 +121,9 @@ impl Setup<'_> {
 
     /// Particles from a file. Of a snapshot's box, that of the scene takes the place.
     fn read_file(&mut self, path: &Path) -> Result<()> {
-        let snapshot = io::read(path)?;
+        let mut snapshot = io::read(path)?;
+        // What the scene gives anew need not be usable in the file.
+        snapshot.left_aside.retain(|l| !self.scene.set.contains_key(&l.name));
         if snapshot.points.is_empty() {
             let reason = "it holds no particles".into();
             return Err(Error::BadFile { path: path.display().to_string(), reason });
@@ -135,6 +137,9 @@ impl Setup<'_> {
         } else if its != before {
             self.remarks.push("the box is that of the file".into());
         }
+        self.remarks.extend(snapshot.remarks.iter().map(|remark| format!("the file: {remark}")));
+        let unused = |l: &LeftAside| format!("the file: array '{}' is left aside: {}", l.name, l.reason);
+        self.remarks.extend(snapshot.left_aside.iter().map(unused));
         let frame = self.solver.frame();
         self.remarks.extend(frame.about().map(|about| format!("the particles lie along {about}")));
         self.x = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
@@ -236,11 +241,27 @@ impl Setup<'_> {
                 }
             }
         }
+        self.refuse_cells()?;
         if self.exact.is_some() && !set.contains_key("T") {
             let values = self.array("T", "exact")?;
             self.solver.set("T", Strided::packed(&values))?;
         }
         Ok(())
+    }
+
+    /// What every run needs, where the file has it for cells only and the scene does not give it.
+    fn refuse_cells(&self) -> Result<()> {
+        let Some(snapshot) = &self.snapshot else { return Ok(()) };
+        let given = |name: &str| snapshot.field(name).is_some() || self.scene.set.contains_key(name);
+        let of_cells = |name: &&str| snapshot.of_cells.iter().any(|cell| cell == name) && !given(name);
+        let exact = |name: &&str| *name == "T" && self.exact.is_some();
+        match ["T", "m", "kappa"].iter().find(|name| of_cells(name) && !exact(name)) {
+            Some(name) => {
+                let rule = "particles are points: make it an array of points (ParaView: Cell Data to Point Data)";
+                Err(Error::bad(&format!("array '{name}' of the file"), "of cells", rule))
+            }
+            None => Ok(()),
+        }
     }
 
     /// The masses of a lattice, rho times the volume of a particle, unless the scene sets them.
@@ -268,6 +289,7 @@ impl Setup<'_> {
         if let Some(exact) = self.exact.as_ref().filter(|_| text == "exact") {
             return Ok(at_all(exact, &self.x, self.solver.dim(), self.start));
         }
+        self.snapshot.as_ref().map_or(Ok(None), |s| s.usable(text))?;
         let fields = || self.snapshot.iter().flat_map(|s| &s.fields);
         let field = fields().find(|f| f.name == text).ok_or_else(|| {
             let laws = LAWS.iter().filter(|_| name == "kappa").map(|(law, _)| *law);
