@@ -120,18 +120,27 @@ impl Error {
 
     /// Shorthand for a scalar argument that breaks its rule.
     pub fn bad(argument: &str, value: impl ToString, rule: &str) -> Error {
-        Error::BadValue { argument: argument.into(), value: value.to_string(), rule: rule.into() }
+        Error::BadValue { argument: argument.into(), value: shown(value), rule: rule.into() }
     }
 
     /// Shorthand for an array element that breaks its rule.
     pub fn bad_at(argument: &str, index: usize, value: impl ToString, rule: &str) -> Error {
-        Error::BadElement { argument: argument.into(), index, value: value.to_string(), rule: rule.into() }
+        Error::BadElement { argument: argument.into(), index, value: shown(value), rule: rule.into() }
     }
 
     /// Shorthand for a word that is in none of the known ones.
     pub fn unknown(what: &str, word: &str, known: impl IntoIterator<Item = impl ToString>) -> Error {
         let known = known.into_iter().map(|k| k.to_string()).collect();
         Error::UnknownWord { what: what.into(), word: word.into(), known }
+    }
+}
+
+/// A value as people write it: Rust writes 1e300 with all its zeros.
+fn shown(value: impl ToString) -> String {
+    let text = value.to_string();
+    match text.parse::<f64>() {
+        Ok(number) if text.len() > 24 => format!("{number:e}"),
+        _ => text,
     }
 }
 
@@ -207,6 +216,7 @@ mod tests {
         }
         assert_eq!(Error::Busy.name(), "BUSY");
         assert_eq!(Error::bad("dt", -1.0, "dt must be positive").code(), -2);
+        assert_eq!(Error::bad("dt", 1e300, "too long").to_string(), "dt is 1e300; too long");
     }
 
     #[test]

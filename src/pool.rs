@@ -136,6 +136,19 @@ impl Pool {
         });
     }
 
+    /// As [`Pool::chunks`] with blocks, for what is made once and takes its time.
+    ///
+    /// # Errors
+    /// `Cancelled`; some of `data` is then as it was.
+    pub fn make<T: Send>(&self, data: &mut [T], f: impl Fn(usize, &mut [T]) + Sync + Send) -> Result<()> {
+        self.chunks(data, BLOCK, |start, part| {
+            if self.go_on().is_ok() {
+                f(start, part);
+            }
+        });
+        self.go_on()
+    }
+
     /// The one door to the workers: whatever is done for blocks, the code that shares them out is compiled once.
     fn each(&self, n: usize, work: &(dyn Fn(usize) + Sync)) {
         match &self.workers {

@@ -334,8 +334,15 @@ fn a_refused_solver_leaves_no_threads_and_says_why() {
 
 #[test]
 fn cancel_stops_what_runs_and_nothing_else() {
-    let host = Host::ready("heat dim=2 threads=2");
-    let step = || unsafe { diffusph_step(host.s, 1e-3, null_mut()) };
+    let host = Host::ready("heat dim=2 threads=2 integrator=euler");
+    let mut limit = 0.0;
+    // SAFETY: the place is ours.
+    assert_eq!(unsafe { diffusph_limit(host.s, &mut limit) }, 0);
+    // Long enough to be stopped on the way, and never from where nothing is left to do.
+    let step = || unsafe {
+        assert_eq!(diffusph_set(host.s, c("T"), host.values.as_ptr(), LEN, 1), 0);
+        diffusph_step(host.s, 50.0 * limit, null_mut())
+    };
     // SAFETY: the solver is the host's.
     assert_eq!(unsafe { diffusph_cancel(host.s) }, 0);
     assert_eq!(step(), 0, "nothing ran when it was cancelled");

@@ -154,12 +154,12 @@ fn spacing(x: &[f64], dim: usize) -> Result<Option<(f64, f64)>> {
         return Ok(Some((0.0, 0.0))); // all in one place
     }
     let mut cloud = Cloud::sort(&Domain::open(dim), x, 2.0 * (volume / n as f64).powf(1.0 / dim as f64), &pool)?;
-    let mut h = density::guess(&cloud, 2.0)?;
+    let mut h = density::guess(&cloud, 2.0, &pool)?;
     // One particle far away makes for cells in which all others are.
     let least = |h: &[f64]| h.iter().copied().fold(f64::INFINITY, f64::min);
     while cloud.is_coarse_for(least(&h)) {
         let before = std::mem::replace(&mut cloud, Cloud::sort(&Domain::open(dim), x, least(&h), &pool)?);
-        h = density::guess(&cloud, 2.0)?;
+        h = density::guess(&cloud, 2.0, &pool)?;
         if cloud.grid.edge >= before.grid.edge {
             break;
         }

@@ -5,6 +5,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use std::borrow::Cow;
 use std::fmt::Display;
+use std::io;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use vtkio::model::{
     Attribute, Attributes, ByteOrder, CellType, Cells, DataSet, FieldArray, IOBuffer, ScalarType,
@@ -21,10 +22,35 @@ pub fn encode(view: &View) -> Result<Vec<u8>> {
         file_path: None,
     };
     guarded(|| {
-        let mut bytes = Vec::new();
-        let done = file.write_legacy(&mut bytes);
-        done.map(|()| bytes).map_err(|e| Error::Io { path: String::new(), reason: format!("cannot write it: {e}") })
+        let mut text = Text::default();
+        let done = file.write_legacy(&mut text);
+        let why = |e: vtkio::Error| Error::Io { path: String::new(), reason: format!("cannot write it: {e}") };
+        match text.refused {
+            Some(error) => Err(error),
+            None => done.map(|()| text.bytes).map_err(why),
+        }
     })
+}
+
+/// The text so far; where there is no room for more, it says so.
+#[derive(Default)]
+struct Text {
+    bytes: Vec<u8>,
+    refused: Option<Error>,
+}
+
+impl io::Write for Text {
+    fn write(&mut self, more: &[u8]) -> io::Result<usize> {
+        if let Err(error) = memory::appended("a legacy file", &mut self.bytes, more) {
+            self.refused = Some(error);
+            return Err(io::ErrorKind::OutOfMemory.into());
+        }
+        Ok(more.len())
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        Ok(())
+    }
 }
 
 fn guarded<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {

@@ -162,14 +162,14 @@ impl State {
     /// shorter ones.
     fn guessed_lengths(&mut self, call: &str) -> Result<Vec<f64>> {
         loop {
-            let h = density::guess(self.cloud(call)?, self.choices.h_fac)?;
+            let h = density::guess(self.cloud(call)?, self.choices.h_fac, &self.pool)?;
             let (reach, before) = (self.choices.kernel.radius() * least(&h), self.cloud(call)?.grid.edge);
             if !self.cloud(call)?.is_coarse_for(reach) {
                 return Ok(h);
             }
             self.sort_again(reach)?;
             if self.cloud(call)?.grid.edge >= before {
-                return density::guess(self.cloud(call)?, self.choices.h_fac);
+                return density::guess(self.cloud(call)?, self.choices.h_fac, &self.pool);
             }
         }
     }

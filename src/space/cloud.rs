@@ -174,11 +174,11 @@ impl Cloud {
             p
         };
         let mut order = memory::filled("Morton keys", x.len(), (0u64, 0u32))?;
-        pool.chunks(&mut order, BLOCK, |start, part| {
+        pool.make(&mut order, |start, part| {
             for (k, item) in part.iter_mut().enumerate() {
                 *item = (grid.key(position(start + k)), (start + k) as u32);
             }
-        });
+        })?;
         let compare = |a: &(u64, u32), b: &(u64, u32)| {
             a.0.cmp(&b.0).then_with(|| {
                 let (p, q) = (position(a.1 as usize), position(b.1 as usize));
@@ -186,7 +186,6 @@ impl Cloud {
                 by_axis.unwrap_or(a.1.cmp(&b.1))
             })
         };
-        pool.go_on()?;
         if pool.install(|| order.par_sort_unstable_by(compare)).is_none() {
             order.sort_unstable_by(compare);
         }

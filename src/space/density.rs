@@ -330,7 +330,10 @@ fn solve_open(kernel: &Kernel, target: f64, rows: &Rows, weigh: Weigh, pool: &Po
 }
 
 /// A first guess: h_fac times the spacing in the smallest Morton cell around a particle that holds a crowd.
-pub fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
+///
+/// # Errors
+/// `NoMemory`; `Cancelled`.
+pub fn guess(cloud: &Cloud, h_fac: f64, pool: &Pool) -> Result<Vec<f64>> {
     let dim = cloud.dim();
     let keys = &cloud.keys;
     let crowd = CROWD.min(cloud.len());
@@ -357,7 +360,13 @@ pub fn guess(cloud: &Cloud, h_fac: f64) -> Result<Vec<f64>> {
         edge / ((last - first) as f64).powf(1.0 / dim as f64)
     };
     let least = extent(cloud) * 1e-12;
-    memory::collected("h", (0..cloud.len()).map(|i| (h_fac * spacing(i)).max(least).max(*LENGTHS.start())))
+    let mut h = memory::filled("h", cloud.len(), 0.0)?;
+    pool.make(&mut h, |start, part| {
+        for (k, h) in part.iter_mut().enumerate() {
+            *h = (h_fac * spacing(start + k)).max(least).max(*LENGTHS.start());
+        }
+    })?;
+    Ok(h)
 }
 
 fn extent(cloud: &Cloud) -> f64 {
@@ -401,7 +410,7 @@ mod tests {
                 // Unequal masses: N(h) weighs neighbours by their mass, or by number.
                 let mass: Vec<f64> = (0..particles).map(|i| 1.0 + 0.3 * ((i % 7) as f64)).collect();
                 for weigh in [Weigh::Mass(&mass), Weigh::Number] {
-                    let start = guess(&cloud, kernel.h_fac()).unwrap();
+                    let start = guess(&cloud, kernel.h_fac(), &pool).unwrap();
                     let h = lengths(&kernel, kernel.h_fac(), &cloud, weigh, start, &pool).unwrap();
                     let rows = Rows::new(&cloud, &h, kernel.radius(), &pool).unwrap();
                     let mut expected = vec![0.0; particles];
@@ -449,7 +458,7 @@ mod tests {
         let kernel = Kernel::new("M4", 1).unwrap();
         let solve = |x: &[f64]| {
             let cloud = Cloud::sort(&Domain::open(1), Strided::packed(x), 0.0, &pool).unwrap();
-            smoothing_lengths(&kernel, 1.2, &cloud, &vec![1.0; x.len()], guess(&cloud, 1.2).unwrap(), &pool)
+            smoothing_lengths(&kernel, 1.2, &cloud, &vec![1.0; x.len()], guess(&cloud, 1.2, &pool).unwrap(), &pool)
         };
         let mut x: Vec<f64> = (0..100).map(|i| f64::from(i) * 1e-6).collect();
         x.push(1e3);
@@ -479,7 +488,7 @@ mod tests {
         let cloud = Cloud::sort(&domain, Strided::new("x", x, mass.len(), dim, dim).unwrap(), 0.0, &pool).unwrap();
         let inward = |v: &[f64]| cloud.host.iter().map(|&i| v[i as usize]).collect::<Vec<_>>();
         let (m, rho) = (inward(mass), inward(rho));
-        let start = guess(&cloud, kernel.h_fac()).unwrap();
+        let start = guess(&cloud, kernel.h_fac(), &pool).unwrap();
         let h = smoothing_lengths(&kernel, kernel.h_fac(), &cloud, &m, start, &pool).unwrap();
         let found = |i: usize| m[i] * (kernel.h_fac() / h[i]).powi(dim as i32);
         (0..m.len()).map(|i| found(i) / rho[i]).collect()

@@ -327,7 +327,7 @@ mod tests {
                     let domain = Domain::new(&[0.0; 3][..dim], &[1.0; 3][..dim], &[periodic; 3][..dim]).unwrap();
                     let at = Strided::new("x", &x, n, dim, dim).unwrap();
                     let cloud = Cloud::sort(&domain, at, 0.0, &pool).unwrap();
-                    let guess = super::super::density::guess(&cloud, 1.0).unwrap();
+                    let guess = super::super::density::guess(&cloud, 1.0, &pool).unwrap();
                     let mass = vec![1.0; n];
                     let h = super::super::density::smoothing_lengths(&kernel, 1.0, &cloud, &mass, guess, &pool);
                     rows_agree(&cloud, &h.unwrap(), &pool, &format!("dim {dim} ratio {ratio}"));

@@ -13,7 +13,7 @@
 
 enum { SIDE = 150, N = SIDE * SIDE, STEP = 512 << 10, LIMITS = 300 };
 static double x[2 * N], T[N], flux[2 * N];
-static const char *names[] = {"create", "set_particles", "set", "step", "get", "write", "read"};
+static const char *names[] = {"create", "set_particles", "set", "step", "get", "write", "write legacy", "read", "read legacy"};
 enum { CALLS = sizeof names / sizeof *names };
 
 static diffusph_solver *s;
@@ -29,7 +29,9 @@ static int call(int which)
     case 3: return diffusph_step(s, 1e-4, NULL);
     case 4: return diffusph_get(s, "flux", flux, N, 2);
     case 5: return diffusph_write_vtk(s, "narrow.vtu");
-    default: return diffusph_read_vtk(s, "narrow.vtu");
+    case 6: return diffusph_write_vtk(s, "narrow.vtk");
+    case 7: return diffusph_read_vtk(s, "narrow.vtu");
+    default: return diffusph_read_vtk(s, "narrow.vtk");
     }
 }
 
