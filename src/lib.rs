@@ -13,6 +13,8 @@
 //! | geometry | [`space`] |
 //! | data | [`kernel`] |
 //! | ground | [`error`], [`sum`], [`memory`], [`pool`], [`words`] |
+//!
+//! The feature `reserve` (default) makes [`memory`]'s allocator that of the whole program; one that has its own leaves it out.
 
 pub mod array;
 pub mod error;

@@ -6,7 +6,9 @@
 use crate::error::{Error, Result};
 use crate::memory;
 use rayon::prelude::*;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::cmp::Ordering;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::sync::{Arc, Mutex, OnceLock};
 use std::thread::JoinHandle;
 
@@ -83,7 +85,7 @@ impl Pool {
 
     /// Forgets that earlier work was cancelled.
     pub fn begin(&self) {
-        self.cancel.store(false, Ordering::Relaxed);
+        self.cancel.store(false, Relaxed);
     }
 
     /// To be asked every few ten milliseconds.
@@ -91,7 +93,7 @@ impl Pool {
     /// # Errors
     /// `Cancelled` where somebody wants no more of it.
     pub fn go_on(&self) -> Result<()> {
-        if self.cancel.load(Ordering::Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
+        if self.cancel.load(Relaxed) { Err(Error::Cancelled) } else { Ok(()) }
     }
 
     /// `f(0), f(1), … f(n - 1)` in any order of execution, results in order.
@@ -166,9 +168,24 @@ impl Pool {
         }
     }
 
-    /// Runs a closure inside the pool, so that rayon's own algorithms (sorts) use these workers and no others.
-    pub fn install<T: Send>(&self, f: impl FnOnce() -> T + Send) -> Option<T> {
-        self.workers.as_ref().map(|pool| pool.install(f))
+    /// Sorts with these workers and no others.
+    ///
+    /// # Errors
+    /// `Cancelled`; the items are then in some order.
+    pub fn sort<T: Send>(&self, data: &mut [T], compare: impl Fn(&T, &T) -> Ordering + Sync) -> Result<()> {
+        // The only way out of a sort on the way is to unwind from a comparison, which prints nothing.
+        let compare = |a: &T, b: &T| match self.cancel.load(Relaxed) {
+            true => resume_unwind(Box::new(Error::Cancelled)),
+            false => compare(a, b),
+        };
+        let sorted = catch_unwind(AssertUnwindSafe(|| match &self.workers {
+            Some(pool) => pool.install(|| data.par_sort_unstable_by(compare)),
+            None => data.sort_unstable_by(compare),
+        }));
+        sorted.or_else(|payload| match payload.downcast::<Error>() {
+            Ok(error) => Err(*error),
+            Err(other) => resume_unwind(other),
+        })
     }
 
     /// Forgets the workers without joining: in a forked child they do not exist.
@@ -254,6 +271,25 @@ mod tests {
             assert_eq!(pool.map(9, |i| i), (0..9).collect::<Vec<_>>());
         }
         assert!(Pool::starting(3, at_most(2)).is_err() && Pool::starting(2, at_most(2)).is_ok());
+    }
+
+    #[test]
+    fn sorting_can_be_cancelled() {
+        for threads in [1, 3] {
+            let pool = Pool::new(threads).unwrap();
+            let mut data: Vec<u64> = (0..100_000).map(|i| i * 2_654_435_761 % 100_003).collect();
+            let cancel = pool.canceller();
+            let done = pool.sort(&mut data, |a, b| {
+                cancel.store(*a == 7 || cancel.load(Relaxed), Relaxed);
+                a.cmp(b)
+            });
+            assert!(done == Err(Error::Cancelled) && !data.is_sorted());
+            pool.begin();
+            pool.sort(&mut data, u64::cmp).unwrap();
+            assert!(data.is_sorted());
+            let panics = AssertUnwindSafe(|| pool.sort(&mut [3, 1, 2], |_, _| resume_unwind(Box::new("ours"))));
+            assert!(catch_unwind(panics).is_err());
+        }
     }
 
     #[test]

@@ -2,7 +2,7 @@
 
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::io::{self, Field, LeftAside, Snapshot};
+use crate::io::{self, Field, LeftAside, OF_CELLS, Snapshot};
 use crate::model::fields::{Access, FIELDS};
 use crate::pool::Pool;
 use crate::solver::Solver;
@@ -49,10 +49,7 @@ pub fn text(path: &Path) -> Result<String> {
         line(name, format!("left aside: {reason}"));
     }
     for name in &snapshot.of_cells {
-        line(
-            name,
-            "of cells, not of points: left aside; make it one of points (ParaView: Cell Data to Point Data)".into(),
-        );
+        line(name, OF_CELLS.into());
     }
     for (name, note) in &snapshot.notes {
         line("note", format!("{name}: {}", one_line(note)));

@@ -130,7 +130,7 @@ pub unsafe extern "C" fn diffusph_set_progress_callback(
     }
 }
 
-/// A function told of failed calls, of the plan when it changes, and of each step; NULL takes it away. Without it,
+/// A function told of failed calls, of what a file has that is not taken, of the plan when it changes, and of each step; NULL takes it away. Without it,
 /// nothing is told: the library prints nothing.
 ///
 /// # Safety

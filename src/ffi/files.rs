@@ -1,5 +1,6 @@
 //! VTK files.
 
+use super::codes::DIFFUSPH_LOG_WARNING;
 use super::guard::{Handle, with};
 use super::pointers::file;
 use std::ffi::c_char;
@@ -36,7 +37,8 @@ pub unsafe extern "C" fn diffusph_write_series(s: *mut Handle, pvd_path: *const 
 /// of all that was set before (particles, quantities, numbers, laws, box and time), and the solver goes on from it to the bit
 /// as the one that wrote it, if its words are the same; functions that were lent must be lent before. Of the file of another
 /// program, positions are taken, every array with the name of a quantity that can be set, and the time if there is one.
-/// In one and two dimensions particles may lie along any axes of the file, and are written along the same.
+/// In one and two dimensions particles may lie along any axes of the file, and are written along the same. The log is told
+/// what the file has that is not taken.
 ///
 /// Errors: IO, BAD_FILE, BAD_VALUE naming the first bad element, or where the particles fill more dimensions than the solver
 /// has; OUT_OF_ORDER naming a function that the snapshot needs; nothing is changed then.
@@ -45,5 +47,11 @@ pub unsafe extern "C" fn diffusph_write_series(s: *mut Handle, pvd_path: *const 
 /// The header's conventions.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn diffusph_read_vtk(s: *mut Handle, path: *const c_char) -> i32 {
-    unsafe { with(s, |inside| inside.solver.read_vtk(file("path", path)?)) }
+    unsafe {
+        with(s, |inside| {
+            let left_aside = inside.solver.read_vtk(file("path", path)?)?;
+            left_aside.iter().for_each(|text| inside.tell(DIFFUSPH_LOG_WARNING, text));
+            Ok(())
+        })
+    }
 }

@@ -14,6 +14,10 @@
 //! | `get` | what a host gets |
 //! | `files` | VTK files |
 //! | `catalogue` | what can be chosen, and versions |
+//!
+//! The first call installs a panic hook, once in the process, in front of the one that is there: panics that a call will
+//! turn into a code are not printed, all others go on to it. In C hosts it is that of the Rust inside this library alone;
+//! a Rust program that calls these functions shares it.
 
 mod advance;
 mod callback;

@@ -31,7 +31,7 @@ mod xml_write;
 
 pub use data::{Data, Element};
 pub use pvd::{Entry, Series};
-pub use snapshot::{Field, LeftAside, Snapshot};
+pub use snapshot::{Field, LeftAside, OF_CELLS, Snapshot};
 pub use view::{Column, Values, View};
 pub use xml_write::{Encoding, Options};
 
@@ -53,11 +53,6 @@ pub fn read(path: impl AsRef<Path>) -> Result<Snapshot> {
     if snapshot.ghosts > 0 {
         snapshot.remarks.push(format!("{} points are ghosts (vtkGhostType): left aside", snapshot.ghosts));
     }
-    snapshot
-        .left_aside
-        .iter()
-        .for_each(|l| log::warn!("{}: array '{}' left aside: {}", path.display(), l.name, l.reason));
-    snapshot.remarks.iter().for_each(|remark| log::warn!("{}: {remark}", path.display()));
     Ok(snapshot)
 }
 

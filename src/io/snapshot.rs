@@ -36,6 +36,10 @@ pub struct LeftAside {
     pub reason: String,
 }
 
+/// Why arrays of cells are not read, and what to do.
+pub const OF_CELLS: &str =
+    "of cells, not of points: left aside; make it one of points (ParaView: Cell Data to Point Data)";
+
 /// The most bytes that are kept of one text of a file.
 pub(super) const LONGEST_NOTE: usize = 1 << 24;
 
@@ -51,6 +55,14 @@ impl Snapshot {
     /// The field of that name.
     pub fn field(&self, name: &str) -> Option<&Field> {
         self.fields.iter().find(|f| f.name == name)
+    }
+
+    /// What the file has that is not read, and what else is to be known of it, in words.
+    pub fn told(&self) -> Vec<String> {
+        let unused = |l: &LeftAside| format!("array '{}' is left aside: {}", l.name, l.reason);
+        let of_cells = |name: &String| format!("array '{name}' is one {OF_CELLS}");
+        let arrays = self.left_aside.iter().map(unused).chain(self.of_cells.iter().map(of_cells));
+        self.remarks.iter().cloned().chain(arrays).collect()
     }
 
     /// The field of that name, if the file has one.

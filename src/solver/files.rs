@@ -114,13 +114,15 @@ impl Solver {
     /// Particles from a VTK file. From a snapshot of ours: all that it holds, in place of what was set before, so that the
     /// solver goes on as the one that wrote it; its words and callbacks stay. From the file of another program: positions,
     /// every array of one component that has the name of an input, and the time if there is one. Where fewer than three dimensions are
-    /// filled, they may be along any axes.
+    /// filled, they may be along any axes. Answers what the file has that was left aside.
     ///
     /// # Errors
     /// `Io`, `BadFile`; `BadElement` naming the first bad value; `BadValue` where the particles fill more dimensions than
     /// the solver has; `OutOfOrder` naming a callback that the snapshot needs. Nothing is changed then.
-    pub fn read_vtk(&mut self, path: impl AsRef<Path>) -> Result<()> {
-        self.set_snapshot(&io::read(path)?)
+    pub fn read_vtk(&mut self, path: impl AsRef<Path>) -> Result<Vec<String>> {
+        let snapshot = io::read(path)?;
+        self.set_snapshot(&snapshot)?;
+        Ok(snapshot.told())
     }
 
     /// The same from a snapshot in memory.

@@ -5,7 +5,6 @@ use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
-use rayon::slice::ParallelSliceMut;
 use std::cmp::Ordering;
 
 /// Each cell is cut this many times per axis (in powers of two) for the order inside it.
@@ -186,10 +185,7 @@ impl Cloud {
                 by_axis.unwrap_or(a.1.cmp(&b.1))
             })
         };
-        if pool.install(|| order.par_sort_unstable_by(compare)).is_none() {
-            order.sort_unstable_by(compare);
-        }
-        pool.go_on()?;
+        pool.sort(&mut order, compare)?;
         let host = memory::collected("order", order.iter().map(|item| item.1))?;
         let keys = memory::collected("keys", order.iter().map(|item| item.0))?;
         let mut axes = [const { Vec::new() }; 3];

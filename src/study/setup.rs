@@ -5,7 +5,7 @@ use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
 use super::{choose, glass, lattice, surface};
 use crate::array::Strided;
 use crate::error::{Error, Result};
-use crate::io::{self, LeftAside, Snapshot};
+use crate::io::{self, Snapshot};
 use crate::model::conductivity::LAWS;
 use crate::model::fields::{self, NUMBERS};
 use crate::solver::Solver;
@@ -137,9 +137,7 @@ impl Setup<'_> {
         } else if its != before {
             self.remarks.push("the box is that of the file".into());
         }
-        self.remarks.extend(snapshot.remarks.iter().map(|remark| format!("the file: {remark}")));
-        let unused = |l: &LeftAside| format!("the file: array '{}' is left aside: {}", l.name, l.reason);
-        self.remarks.extend(snapshot.left_aside.iter().map(unused));
+        self.remarks.extend(snapshot.told().into_iter().map(|remark| format!("the file: {remark}")));
         let frame = self.solver.frame();
         self.remarks.extend(frame.about().map(|about| format!("the particles lie along {about}")));
         self.x = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();

@@ -76,9 +76,39 @@ fn what_a_solver_needs_and_cannot_use_is_refused() {
     assert!(error.contains("array 'T'") && error.contains("more than 4"), "{error}");
     // Three numbers each are no mass, whatever they are called.
     let vector = array("Float64", "m", "NumberOfComponents=\"3\"", &"0 0 1 ".repeat(4));
-    solver.read_vtk(folder.write("b.vtu", square("", &(vector + &temperature())))).unwrap();
+    let odd = array("Float64", "p", "NumberOfComponents=\"3\"", "1 2 3 4");
+    let told = solver.read_vtk(folder.write("b.vtu", square("", &(vector + &odd + &temperature())))).unwrap();
+    assert!(told.len() == 1 && told[0].contains("'p' is left aside"), "{told:?}");
     assert_eq!(solver.get_all("T").unwrap(), [1.0, 2.0, 3.0, 4.0]);
     assert!(solver.get_all("m").is_err());
+}
+
+/// What a host's log is told, by its level.
+type Told = std::sync::Mutex<Vec<(i32, String)>>;
+
+unsafe extern "C-unwind" fn hears(told: *mut std::ffi::c_void, level: i32, text: *const std::ffi::c_char) {
+    // SAFETY: the test's word, and the library's.
+    let (told, text) = unsafe { (&*told.cast::<Told>(), std::ffi::CStr::from_ptr(text)) };
+    told.lock().unwrap().push((level, text.to_str().unwrap().into()));
+}
+
+#[test]
+fn a_host_is_told_what_its_file_has_that_is_not_taken() {
+    use diffusph::ffi::*;
+    let (folder, told) = (Folder::new(), Told::default());
+    let odd = array("Float64", "p", "NumberOfComponents=\"3\"", "1 2 3 4");
+    let path = folder.write("a.vtu", square("", &(odd + &temperature())));
+    let path = std::ffi::CString::new(path.to_str().unwrap()).unwrap();
+    let (mut s, mut why) = (std::ptr::null_mut(), [0; 99]);
+    // SAFETY: all places are ours and outlive the solver.
+    unsafe {
+        assert_eq!(diffusph_create(c"heat dim=2 threads=1".as_ptr(), &mut s, why.as_mut_ptr(), 99), 0);
+        let user = std::ptr::from_ref(&told).cast_mut().cast();
+        assert_eq!(diffusph_set_log_callback(s, Some(hears), user), 0);
+        assert_eq!((diffusph_read_vtk(s, path.as_ptr()), diffusph_destroy(s)), (0, 0));
+    }
+    let told = told.into_inner().unwrap();
+    assert!(told.len() == 1 && told[0].0 == DIFFUSPH_LOG_WARNING && told[0].1.contains("'p'"), "{told:?}");
 }
 
 #[test]
