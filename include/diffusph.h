@@ -445,7 +445,7 @@ int32_t diffusph_set_progress_callback(struct diffusph_solver *s,
                                        void *user);
 
 /**
- * A function told of failed calls, of the plan when it changes, and of each step; NULL takes it away. Without it,
+ * A function told of failed calls, of what a file has that is not taken, of the plan when it changes, and of each step; NULL takes it away. Without it,
  * nothing is told: the library prints nothing.
  */
 int32_t diffusph_set_log_callback(struct diffusph_solver *s,
@@ -599,7 +599,8 @@ int32_t diffusph_write_series(struct diffusph_solver *s,
  * of all that was set before (particles, quantities, numbers, laws, box and time), and the solver goes on from it to the bit
  * as the one that wrote it, if its words are the same; functions that were lent must be lent before. Of the file of another
  * program, positions are taken, every array with the name of a quantity that can be set, and the time if there is one.
- * In one and two dimensions particles may lie along any axes of the file, and are written along the same.
+ * In one and two dimensions particles may lie along any axes of the file, and are written along the same. The log is told
+ * what the file has that is not taken.
  *
  * Errors: IO, BAD_FILE, BAD_VALUE naming the first bad element, or where the particles fill more dimensions than the solver
  * has; OUT_OF_ORDER naming a function that the snapshot needs; nothing is changed then.
