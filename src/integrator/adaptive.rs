@@ -154,8 +154,8 @@ impl<'a> Adaptive<'a> {
         work: &mut Work,
     ) -> Result<bool> {
         let dt = schedule.dt;
-        let error = match self.estimate(method, schedule, system, t, y, work).and_then(|error| self.kept(error, system))
-        {
+        let estimated = self.estimate(method, schedule, system, t, y, work);
+        let error = match estimated.and_then(|error| self.kept(error, work.rounding, system)) {
             Err(error) if self.shorter_may_do(&error, system) => {
                 self.failure = Some((RETREAT * dt, error));
                 f64::INFINITY
@@ -181,13 +181,14 @@ impl<'a> Adaptive<'a> {
     }
 
     /// The error of what is in `trial`, if that is within its bounds, or is brought back.
-    fn kept(&mut self, error: f64, system: &mut dyn System) -> Result<f64> {
+    fn kept(&mut self, error: f64, rounding: f64, system: &mut dyn System) -> Result<f64> {
         let range = self.control.range;
         let Some(index) = range.first_outside(self.pool, &self.trial).filter(|_| error <= 1.0) else {
             return Ok(error);
         };
         let value = self.trial[index];
-        if system.confine(range, CONFINED, &mut self.trial)? {
+        let room = rounding + ROUNDING * sum::max(self.pool, self.trial.len(), |i| self.trial[i].abs());
+        if system.confine(range, CONFINED, &mut self.trial)? || range.clamp(self.pool, room, &mut self.trial) {
             return Ok(error);
         }
         let promise = format!("{} keeps in short sub-steps", self.control.method.name);
@@ -236,13 +237,13 @@ impl<'a> Adaptive<'a> {
         let Some(scale) = method.trapezoidal() else {
             let half = Schedule { dt: 0.5 * dt, ..*schedule };
             method.advance(&half, system, pool, t, &mut self.trial, work)?;
-            let (slack, mut tally) = (work.slack, work.tally);
+            let (slack, rounding, mut tally) = (work.slack, work.rounding, work.tally);
             method.advance(&half, system, pool, t + half.dt, &mut self.trial, work)?;
-            let slack = slack + work.slack;
+            let (slack, rounding) = (slack + work.slack, rounding + work.rounding);
             tallied(&mut tally, 1.0, work.tally);
             self.other.copy_from_slice(y);
             method.advance(schedule, system, pool, t, &mut self.other, work)?;
-            (work.slack, work.tally) = (slack, tally);
+            (work.slack, work.rounding, work.tally) = (slack, rounding, tally);
             let share = 1.0 / (2f64.powi(method.order as i32) - 1.0);
             return Ok(self.measure(|i| share * (self.trial[i] - self.other[i])));
         };

@@ -69,7 +69,7 @@ impl Tableau {
         let dt = schedule.dt;
         let [base, stage, first, second, space @ ..] = work.arrays::<10>(y.len())?;
         let rates = [first, second];
-        let (mut supplies, mut slack, mut iterations) = ([Some(0.0); 2], 0.0, 0);
+        let (mut supplies, mut slack, mut rounding, mut iterations) = ([Some(0.0); 2], 0.0, 0.0, 0);
         let mut tallies = [Tally::default(); 2];
         stage.copy_from_slice(y);
         for (i, (a, c)) in self.a.iter().zip(self.c).enumerate() {
@@ -82,9 +82,12 @@ impl Tableau {
             }
             base.copy_from_slice(y);
             (0..i).for_each(|j| add(pool, base, dt * a[j], rates[j]));
-            let (allowed, spent) = solve(system, pool, schedule.limits, (time, g), base, stage, space)?;
-            (slack, iterations) = (allowed, iterations + spent);
+            let solved = solve(system, pool, schedule.limits, (time, g), base, stage, space)?;
+            (slack, iterations) = (solved.allowed, iterations + solved.iterations);
             (tallies[i], supplies[i]) = (system.tally(), system.supply(time, stage)?);
+            if supplies[i] != Some(0.0) {
+                rounding = solved.rounding;
+            }
             let supplied = (0..=i).map(|j| Some(dt * a[j] * supplies[j]?)).sum::<Option<f64>>();
             if let Some(supplied) = supplied {
                 slack += conserve(pool, g, supplied, y, stage, space);
@@ -95,7 +98,7 @@ impl Tableau {
             });
         }
         y.copy_from_slice(stage);
-        work.slack = slack;
+        (work.slack, work.rounding) = (slack, rounding);
         work.iterations += iterations;
         // Stiffly accurate: the step is its last stage.
         if let Some(weights) = self.a.last() {
@@ -105,8 +108,16 @@ impl Tableau {
     }
 }
 
-/// Solves Y = base + g rate(t, Y), starting from the Y given. Returns the largest residual that was allowed (for a
-/// matrix whose inverse is positive it bounds the error too), and the number of iterations.
+/// How a stage was solved.
+struct Solved {
+    /// The largest residual that was allowed: for a matrix whose inverse is positive it bounds the error too.
+    allowed: f64,
+    /// The part of it that is rounding.
+    rounding: f64,
+    iterations: u64,
+}
+
+/// Solves Y = base + g rate(t, Y), starting from the Y given.
 fn solve(
     system: &mut dyn System,
     pool: &Pool,
@@ -115,7 +126,7 @@ fn solve(
     base: &[f64],
     y: &mut [f64],
     [diagonal, weight, residual, correction, p, q]: &mut Space,
-) -> Result<(f64, u64)> {
+) -> Result<Solved> {
     let n = y.len();
     let (mut spent, mut size, mut change) = (0, 0.0, None);
     let (mut worst, mut wanted) = (f64::INFINITY, 0.0);
@@ -138,16 +149,17 @@ fn solve(
         let change = *change.get_or_insert_with(|| {
             sum::max(pool, n, |i| (residual[i] / (1.0 + g * diagonal[i])).abs().max((y[i] - base[i]).abs()))
         });
-        let rounding = ROUNDING * (1.0 + g * sum::max(pool, n, |i| diagonal[i]));
-        if rounding.is_nan() || rounding > ILLEGIBLE {
-            return Err(unsolved(0, limits.iterations, rounding, ILLEGIBLE));
+        let relative = ROUNDING * (1.0 + g * sum::max(pool, n, |i| diagonal[i]));
+        if relative.is_nan() || relative > ILLEGIBLE {
+            return Err(unsolved(0, limits.iterations, relative, ILLEGIBLE));
         }
         size = sum::max(pool, n, |i| y[i].abs()).max(change).max(size);
         // The base of a second stage is as large as g times a rate: its rounding counts once.
-        wanted = limits.tolerance * change + rounding * size + ROUNDING * sum::max(pool, n, |i| base[i].abs());
+        let rounding = relative * size + ROUNDING * sum::max(pool, n, |i| base[i].abs());
+        wanted = limits.tolerance * change + rounding;
         worst = sum::max(pool, n, |i| residual[i].abs());
         if worst <= wanted || n == 0 {
-            return Ok((wanted.max(0.0), spent));
+            return Ok(Solved { allowed: wanted.max(0.0), rounding: rounding.max(0.0), iterations: spent });
         }
         if linear == Linear::Frozen && (worst.is_nan() || worst >= RISE * taken.before) {
             if taken.halve(pool, y, correction) {

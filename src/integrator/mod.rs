@@ -337,7 +337,7 @@ impl Method {
         y: &mut [f64],
         work: &mut Work,
     ) -> Result<()> {
-        (work.slack, work.tally) = (0.0, Tally::default());
+        (work.slack, work.rounding, work.tally) = (0.0, 0.0, Tally::default());
         match self.family {
             Family::Explicit(tableau) => tableau.advance(schedule.dt, system, pool, t, y, work),
             Family::Stabilised(recursion) => recursion.advance(schedule, system, pool, t, y, work),
@@ -387,6 +387,8 @@ pub struct Work {
     arrays: [Vec<f64>; 10],
     /// How far the last sub-step may be from the solution of its equations: 0 for explicit methods.
     pub slack: f64,
+    /// The part of it that is rounding, where y exchanges with an outside that keeps no account.
+    pub rounding: f64,
     /// Iterations of conjugate gradients so far.
     pub iterations: u64,
     /// What the last sub-step has added to what is tallied.

@@ -29,6 +29,17 @@ impl Range {
         sum::first(pool, y.len(), |i| !(y[i] >= self.low && y[i] <= self.high))
     }
 
+    /// Moves values that are outside to the bound, if none is farther than `room`: what rounding makes of values that
+    /// have come to rest there.
+    pub fn clamp(&self, pool: &Pool, room: f64, y: &mut [f64]) -> bool {
+        let nearly = Range { low: self.low - room, high: self.high + room };
+        let may = room.is_finite() && nearly.first_outside(pool, y).is_none();
+        if may {
+            pool.update(y, |_, part| part.iter_mut().for_each(|y| *y = y.clamp(self.low, self.high)));
+        }
+        may
+    }
+
     /// Moves values that are outside to the bound and takes what that gives, or costs, from the others of the same part,
     /// each in proportion to its distance from the bound: Σ weight y of a part stays the same. `part` numbers the parts,
     /// which exchange nothing with one another. Answers false, with y partly changed, where a part would have to give

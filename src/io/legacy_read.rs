@@ -39,6 +39,9 @@ struct Reader<'a> {
     announced: Option<&'static str>,
 }
 
+/// What a colour is in a text, of 255: a kind that no file can name, for words have no spaces.
+const SHARE: &str = "share of 255";
+
 /// What no number can be taken for: an array that meets one of these has ended early.
 const KEYWORDS: &[&str] = &[
     "DATASET",
@@ -310,7 +313,7 @@ impl<'a> Reader<'a> {
     }
 
     fn colour(&self) -> &'static str {
-        if self.binary { "unsigned_char" } else { "float" }
+        if self.binary { "unsigned_char" } else { SHARE }
     }
 
     /// What is known of an array ends at an empty line.
@@ -331,6 +334,10 @@ impl<'a> Reader<'a> {
         match kind.to_ascii_lowercase().as_str() {
             "bit" if self.binary => self.take(count.div_ceil(8)).map(drop)?,
             "bit" => self.numbers::<u8>(count).map(drop)?,
+            SHARE => {
+                let whole = |share: f64| (255.0 * share + 0.5) as u8;
+                return Ok(Data::U8(self.numbers(count)?.into_iter().map(whole).collect()));
+            }
             kind => match type_of(kind, self.binary) {
                 Some(name) => return Data::read_as(name, Values { reader: self, count }),
                 None if self.binary => {
@@ -564,6 +571,8 @@ mod tests {
         let got = read((TEXT.to_string() + more).as_bytes()).unwrap();
         let names: Vec<_> = got.fields.iter().map(|f| (f.name.as_str(), f.components)).collect();
         assert_eq!(names, [("T", 1), ("t", 6), ("c", 1), ("id", 1), ("last", 2)]);
+        // As VTK reads it, to bytes.
+        assert_eq!(got.field("c").unwrap().data, Data::U8(vec![128]));
         assert_eq!(got.field("id").unwrap().data, Data::I64(vec![5_000_000_000]));
         assert_eq!(read(TEXT.replace('\n', "\r\n").as_bytes()).unwrap().fields, got.fields[..1]);
     }

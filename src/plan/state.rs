@@ -349,9 +349,22 @@ impl State {
     /// How many supports around a particle its rate depends on.
     pub fn ghost_supports(&self) -> f64 {
         let of_weights = self.choices.operator.supports(self.choices.normalise).map_or(f64::INFINITY, f64::from);
-        // A density is a sum over neighbours, and so is what is completed behind a wall.
-        let summed = f64::from(self.inputs[fields::RHO] == Input::Unset);
-        of_weights + summed + f64::from(self.has_walls())
+        // What is completed behind a wall is a sum over neighbours.
+        of_weights + self.density_supports() + f64::from(self.has_walls())
+    }
+
+    /// How many supports around a particle its density depends on: where masses differ, which of two estimates is better
+    /// is seen by how well the volumes of the neighbours' neighbours fill space.
+    fn density_supports(&self) -> f64 {
+        let equal = match &self.inputs[fields::M] {
+            Input::Each(m) => m.iter().all(|mass| mass == &m[0]),
+            _ => true,
+        };
+        match (&self.inputs[fields::RHO], equal) {
+            (Input::Unset, true) => 1.0,
+            (Input::Unset, false) => 3.0,
+            _ => 0.0,
+        }
     }
 
     /// Of kappa between two particles.

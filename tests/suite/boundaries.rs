@@ -666,3 +666,61 @@ fn the_report_says_by_what_heat_came_in() {
         }
     }
 }
+
+/// A cube that exchanges heat with its surroundings, all particles alike, at 300 to 424 K.
+fn exposed(words: &str, exchange: &[(&str, f64)]) -> Solver {
+    let x = lattice(5, 3, 0.0);
+    let mut s = Solver::new(&format!("heat dim=3 {words}")).unwrap();
+    s.set_box(&[0.0; 3], &[1.0; 3], &[false; 3]).unwrap();
+    s.set_particles(Strided::new("x", &x, 125, 3, 3).unwrap()).unwrap();
+    for &(name, value) in [("m", 1.0 / 125.0), ("rho", 1.0), ("c_v", 1.0), ("kappa", 1.0)].iter().chain(exchange) {
+        s.set_number(name, value).unwrap();
+    }
+    set(&mut s, "T", &(0..125).map(|i| 300.0 + f64::from(i)).collect::<Vec<_>>());
+    s
+}
+
+const TIGHT: [&str; 6] = [
+    "",
+    "operator=projected",
+    "integrator=sdirk2",
+    "integrator=sdirk2 tolerance=1e-4",
+    "integrator=crank-nicolson tolerance=1e-4",
+    "integrator=backward-euler",
+];
+
+#[test]
+fn what_has_come_to_rest_at_a_bound_goes_on_in_long_sub_steps() {
+    for words in TIGHT {
+        for (t_ambient, dt) in [(5000.0, 1e3), (5000.0, 1e8), (300.0, 1e8), (424.0, 1e5)] {
+            let mut s =
+                exposed(&format!("{words} max_applications=40000"), &[("emissivity", 1.0), ("T_ambient", t_ambient)]);
+            let report = s.step(dt).unwrap_or_else(|e| panic!("{words} {t_ambient} {dt:e}: {e}"));
+            let worst = s.get_all("T").unwrap().iter().map(|t| (t / t_ambient - 1.0).abs()).fold(0.0, f64::max);
+            println!(
+                "{words} {t_ambient} {dt:e}: {worst:e} {} {} {}",
+                report.substeps, report.rejected, report.applications
+            );
+            assert!(worst < 1e-4, "{words} {t_ambient} {dt:e}: {worst:e}");
+        }
+    }
+}
+
+#[test]
+fn exchange_beyond_all_measure_is_done_or_refused_at_once() {
+    for words in TIGHT.iter().chain(&["integrator=rkl2", "integrator=euler"]) {
+        for (name, value, t_ambient, dt) in [
+            ("flux_in", 1e200, 0.0, 1.0),
+            ("flux_in", -1e200, 0.0, 1.0),
+            ("flux_in", 1e200, 0.0, 1e-3),
+            ("h_conv", 1e200, 1e100, 1.0),
+            ("h_conv", 1e200, 300.0, 1.0),
+            ("emissivity", 1.0, 1e70, 1e8),
+        ] {
+            let mut s = exposed(&format!("{words} max_applications=40000"), &[(name, value), ("T_ambient", t_ambient)]);
+            let start = std::time::Instant::now();
+            let done = s.step(dt).map(|r| (r.substeps, r.rejected, r.applications, r.t_min, r.t_max));
+            println!("{words} {name} {value:e} {dt:e}: {done:?} {:?}", start.elapsed());
+        }
+    }
+}
