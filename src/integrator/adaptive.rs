@@ -183,10 +183,11 @@ impl<'a> Adaptive<'a> {
     /// The error of what is in `trial`, if that is within its bounds, or is brought back.
     fn kept(&mut self, error: f64, rounding: f64, system: &mut dyn System) -> Result<f64> {
         let range = self.control.range;
-        let Some(index) = range.first_outside(self.pool, &self.trial).filter(|_| error <= 1.0) else {
-            return Ok(error);
-        };
+        let Some(index) = range.first_outside(self.pool, &self.trial) else { return Ok(error) };
         let value = self.trial[index];
+        if value.is_finite() && error > 1.0 {
+            return Ok(error);
+        }
         let room = rounding + ROUNDING * sum::max(self.pool, self.trial.len(), |i| self.trial[i].abs());
         if system.confine(range, CONFINED, &mut self.trial)? || range.clamp(self.pool, room, &mut self.trial) {
             return Ok(error);
@@ -257,7 +258,11 @@ impl<'a> Adaptive<'a> {
         let (moved, size) = (self.moved(&self.trial), sum::max(pool, n, |i| self.trial[i].abs()));
         let allowed = self.control.tolerance.unwrap_or(0.0) * self.spread.max(moved) + ROUNDING * size;
         let error = sum::rms(pool, n, weight, error);
-        if error == 0.0 { 0.0 } else { error / allowed }
+        match error / allowed {
+            _ if error == 0.0 => 0.0,
+            unknown if unknown.is_nan() => f64::INFINITY,
+            error => error,
+        }
     }
 }
 

@@ -40,6 +40,7 @@ impl Equations<'_> {
         let (Shifted { g, weight, .. }, pool, n) = (self.shifted, self.pool, r.len());
         p.fill(0.0);
         let (mut length, mut residual, mut done) = (f64::INFINITY, f64::INFINITY, most);
+        let unit = unit_of(sum::max(pool, n, |i| r[i].abs()));
         for iteration in 0..=most {
             residual = sum::max(pool, n, |i| r[i].abs());
             if residual <= target {
@@ -47,7 +48,7 @@ impl Equations<'_> {
             }
             let before = length;
             self.precondition(r, q)?;
-            length = sum::sum(pool, n, |i| weight[i] * r[i] * q[i]);
+            length = sum::sum(pool, n, |i| weight[i] * (unit * r[i]) * (unit * q[i]));
             let again = length / before;
             pool.update(p, |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, p)| *p = q[start + k] + again * *p);
@@ -56,7 +57,7 @@ impl Equations<'_> {
             pool.update(q, |start, part| {
                 part.iter_mut().zip(&p[start..]).for_each(|(q, p)| *q = p - g * *q);
             });
-            let curvature = sum::sum(pool, n, |i| weight[i] * p[i] * q[i]);
+            let curvature = sum::sum(pool, n, |i| weight[i] * (unit * p[i]) * (unit * q[i]));
             let step = length / curvature;
             // Also where nothing is left but underflow, or an overflow: a step that is no number helps nobody.
             if !(curvature > 0.0 && step.is_finite()) {
@@ -97,6 +98,12 @@ impl Equations<'_> {
         }
         Ok(())
     }
+}
+
+/// A power of two that makes numbers of this size about one, so that their squares are numbers, and their digits stay.
+fn unit_of(size: f64) -> f64 {
+    let unit = (-size.log2().round()).exp2();
+    if unit.is_normal() { unit } else { 1.0 }
 }
 
 /// `to += factor * what`.

@@ -34,6 +34,7 @@ fn addressable() -> Option<u64> {
     }
     let text = read_to_string("/proc/self/statm").ok()?;
     let used = text.split_whitespace().next()?.parse::<u64>().ok()? * page as u64;
+    #[allow(clippy::unnecessary_cast)] // not u64 on every system
     Some((limit.rlim_cur as u64).saturating_sub(used))
 }
 

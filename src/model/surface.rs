@@ -30,13 +30,23 @@ impl Exchange {
 
     /// What comes in through unit area at temperature t. Radiation is an odd function, so that it falls everywhere.
     fn flux(&self, sigma_sb: f64, t: f64) -> f64 {
-        let radiated = self.emissivity * sigma_sb * (self.t_ambient.powi(4) - t.abs().powi(3) * t);
-        self.flux_in + self.h_conv * (self.t_ambient - t) + radiated
+        self.flux_in + self.h_conv * (self.t_ambient - t) + self.radiated(sigma_sb, t)
     }
 
-    /// Minus its derivative.
+    /// Where nothing radiates, T may be so large that its fourth power is no number.
+    fn radiated(&self, sigma_sb: f64, t: f64) -> f64 {
+        match self.emissivity {
+            0.0 => 0.0,
+            emissivity => emissivity * sigma_sb * (self.t_ambient.powi(4) - t.abs().powi(3) * t),
+        }
+    }
+
+    /// Minus the derivative of the flux.
     fn fall(&self, sigma_sb: f64, t: f64) -> f64 {
-        self.h_conv + 4.0 * self.emissivity * sigma_sb * t.abs().powi(3)
+        match self.emissivity {
+            0.0 => self.h_conv,
+            emissivity => self.h_conv + 4.0 * emissivity * sigma_sb * t.abs().powi(3),
+        }
     }
 
     /// The temperature at the area where the particle has t: what comes in flows on to its centre,
