@@ -14,7 +14,7 @@ use std::path::Path;
 /// Describes a file.
 ///
 /// # Errors
-/// `Io`, `BadFile`; `BadElement` naming the first value that cannot be used.
+/// `Io`; `BadFile`, also for the first value that cannot be used.
 pub fn text(path: &Path) -> Result<String> {
     let snapshot = io::read(path)?;
     if snapshot.points.is_empty() {
@@ -22,7 +22,7 @@ pub fn text(path: &Path) -> Result<String> {
     }
     let dim = Solver::dimensions_of(&snapshot);
     let mut solver = Solver::new(&format!("heat dim={dim} threads=1"))?;
-    solver.set_snapshot(&snapshot)?;
+    solver.set_snapshot(&snapshot).map_err(|e| io::in_file(path, e))?;
     let frame = solver.frame();
     let mut text = String::new();
     let time = snapshot.time.map_or(String::new(), |t| format!(", t = {t}"));

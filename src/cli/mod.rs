@@ -12,6 +12,8 @@ mod study;
 use crate::error::{Error, Result};
 use crate::study::run::Study;
 use crate::study::scene::Scene;
+use crate::words::Words;
+use clap::error::ContextKind;
 use clap::{Args, Parser, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -80,7 +82,10 @@ impl SceneArgs {
             Some(path) => Scene::read(path)?,
             None => Scene::parse("the default scene", DEFAULT_SCENE)?,
         };
-        for word in self.set.iter().flat_map(|words| words.split_whitespace()) {
+        // Words given twice are refused as those of one line.
+        let words = self.set.join(" ");
+        Words::parse("--set", &words)?;
+        for word in words.split_whitespace() {
             scene.set_word(word)?;
         }
         let folder = self.scene.as_deref().and_then(Path::parent);
@@ -90,7 +95,12 @@ impl SceneArgs {
 
 /// Runs the program with the arguments of the process.
 pub fn main() -> ExitCode {
-    let done = match Program::parse().command {
+    // No scene is called like an option, whatever clap's tip says.
+    let program = Program::try_parse().unwrap_or_else(|mut error| {
+        error.remove(ContextKind::Suggested);
+        error.exit()
+    });
+    let done = match program.command {
         Command::Run { scene, json, out } => run(&scene, json, &out).map(success),
         Command::Plan { scene } => scene.study().and_then(|mut study| print(study.plan()?.to_string())).map(success),
         Command::List { name } => list::text(name.as_deref()).and_then(print).map(success),
@@ -144,7 +154,12 @@ Start with 'diffusph run': it needs no file, and leaves a series for ParaView.";
 fn exit_code(error: &Error) -> u8 {
     match error {
         Error::Cancelled => 130,
-        Error::BadValue { .. } | Error::UnknownWord { .. } | Error::OutOfOrder { .. } | Error::WrongCount { .. } => 2,
+        Error::BadValue { .. }
+        | Error::BadElement { .. }
+        | Error::UnknownWord { .. }
+        | Error::OutOfOrder { .. }
+        | Error::WrongCount { .. }
+        | Error::BoxTooSmall { .. } => 2,
         _ => 1,
     }
 }

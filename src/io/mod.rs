@@ -99,6 +99,10 @@ fn read_any(path: &Path, whole: bool) -> Result<Snapshot> {
 fn open(path: &Path) -> Result<File> {
     let about = std::fs::metadata(path).map_err(system)?;
     let what = if about.is_dir() { "a folder" } else { "a pipe or a device" };
+    // So are some that the system makes up while they are read, and the next byte of one may never come.
+    if about.is_file() && about.len() == 0 {
+        return Err(broken("it is empty"));
+    }
     match about.is_file() {
         true => File::open(path).map_err(system),
         false => Err(system(std::io::Error::other(format!("it is {what}, not a file; give a regular one")))),
@@ -132,12 +136,13 @@ fn system(error: std::io::Error) -> Error {
     Error::Io { path: String::new(), reason: format!("cannot read it: {error}") }
 }
 
-/// The same error with the file's name, unless it has one.
-fn in_file(path: &Path, error: Error) -> Error {
+/// The same error with the file's name, unless it has one; an element that cannot be used is the file's fault.
+pub fn in_file(path: &Path, error: Error) -> Error {
     let named = || path.display().to_string();
     match error {
         Error::BadFile { path, reason } if path.is_empty() => Error::BadFile { path: named(), reason },
         Error::Io { path, reason } if path.is_empty() => Error::Io { path: named(), reason },
+        element @ Error::BadElement { .. } => Error::BadFile { path: named(), reason: element.to_string() },
         other => other,
     }
 }

@@ -193,7 +193,7 @@ mod tests {
         // SAFETY: the layout is not empty, and what is taken is given back with the layout that it has.
         unsafe {
             let block = take(layout);
-            assert!(place(block).is_some() && block as usize % 64 == 0);
+            assert!(place(block).is_some() && (block as usize).is_multiple_of(64));
             block.write_bytes(7, 100);
             let moved = Allocator.realloc(block, layout, 200);
             assert!(place(moved).is_none(), "the system has memory again");

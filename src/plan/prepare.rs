@@ -448,7 +448,14 @@ impl State {
             (Some(m), Some(c_v), Some(0.0)) => 1.0 / (m * c_v),
             _ => 0.0,
         };
-        self.inverse_capacity = Some(memory::collected("capacities", (0..self.len()).map(inverse))?);
+        let inverse = memory::collected("capacities", (0..self.len()).map(inverse))?;
+        let moves = |i: usize| fixed.at(i) == Some(0.0);
+        let bad = (0..inverse.len()).find(|&i| moves(i) && !(inverse[i] > 0.0 && inverse[i].is_finite()));
+        if let (Some(i), Some(m), Some(c_v)) = (bad, bad.and_then(|i| m.at(i)), bad.and_then(|i| c_v.at(i))) {
+            let rule = format!("its product with m = {m:e} is beyond all numbers: choose other units");
+            return Err(Error::bad_at("c_v", self.host(i), format!("{c_v:e}"), &rule));
+        }
+        self.inverse_capacity = Some(inverse);
         Ok(())
     }
 

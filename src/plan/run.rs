@@ -66,7 +66,7 @@ impl State {
         let before = self.before(&plan, &t);
         let range = if self.choices.bounds == Promise::Kept { before.range } else { Range::FINITE };
         let integrator = self.choices.method.name;
-        let mut report = Report { dt, integrator, energy_before: self.energy(&t), ..Report::default() };
+        let mut report = Report { dt, integrator, energy_before: self.finite_energy(&t)?, ..Report::default() };
         self.with_motion(&plan, |motion| {
             motion.range = range;
             motion.advance(time, dt, &mut t, &mut report)
@@ -75,7 +75,7 @@ impl State {
         let checked = Instant::now();
         self.check(&plan, &before, &t)?;
         (report.t_min, report.t_max) = self.extrema(&t);
-        report.energy = self.energy(&t);
+        report.energy = self.finite_energy(&t)?;
         if self.inputs[fields::FIXED] != Input::Number(0.0) {
             let came_in = report.heat_source + report.heat_surface;
             report.heat_fixed = report.energy - report.energy_before - came_in;
@@ -159,6 +159,15 @@ impl State {
         let inputs = &self.inputs;
         let value = |slot: Slot, i: usize| inputs[slot].at(i).unwrap_or(0.0);
         sum::sum(&self.pool, t.len(), |i| value(fields::M, i) * value(fields::C_V, i) * t[i])
+    }
+
+    fn finite_energy(&self, t: &[f64]) -> Result<f64> {
+        let energy = self.energy(t);
+        if !energy.is_finite() {
+            let rule = "the energy, the sum of m c_v T, is beyond all numbers: choose other units";
+            return Err(Error::bad("T", format!("up to {:e}", sum::max(&self.pool, t.len(), |i| t[i].abs())), rule));
+        }
+        Ok(energy)
     }
 
     /// The smallest and the largest value.

@@ -11,6 +11,8 @@ pub const MAX_IMAGES: usize = 6;
 pub const LENGTHS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
 pub const LENGTHS_RULE: &str =
     "lengths must lie between 1e-100 and 1e100, so that volumes are numbers: choose other units";
+const SUPPORTS_RULE: &str =
+    "lengths must lie between 1e-100 and 1e100, so that volumes are numbers: choose another h or h_fac, or other units";
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Domain {
@@ -75,7 +77,7 @@ impl Domain {
     /// Refuses a support that is not among [`LENGTHS`] or so large that it reaches more than [`MAX_IMAGES`] images.
     pub fn check_reach(&self, reach: f64, index: usize) -> Result<()> {
         if !LENGTHS.contains(&reach) {
-            return Err(Error::bad_at("h", index, format!("of a support of {reach:e}"), LENGTHS_RULE));
+            return Err(Error::bad_at("h", index, format!("of a support of {reach:e}"), SUPPORTS_RULE));
         }
         for axis in (0..self.dim).filter(|&a| self.periodic[a]) {
             let length = self.length(axis);

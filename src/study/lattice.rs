@@ -57,7 +57,7 @@ impl Lattice {
     /// cell's shape best: `lo.len()` coordinates per particle.
     ///
     /// # Errors
-    /// `BadElement` for a box without length; `NoMemory`.
+    /// `BadElement` for a box without length; `BadValue` for an n beyond memory.
     pub fn fill(&self, lo: &[f64], hi: &[f64], n: usize) -> Result<Vec<f64>> {
         let dim = lo.len();
         let mut cells = [1usize; 3];
@@ -69,7 +69,11 @@ impl Lattice {
             cells[axis] = (n as f64 * length / (hi[0] - lo[0]) / self.cell[axis]).round().max(1.0) as usize;
         }
         let count = cells.iter().try_fold(self.places.len() * dim, |all, &c| all.checked_mul(c));
-        let mut x = memory::reserved("lattice", count.unwrap_or(usize::MAX))?;
+        let Ok(mut x) = memory::reserved("lattice", count.unwrap_or(usize::MAX)) else {
+            let particles = cells.iter().map(|&c| c as f64).product::<f64>() * self.places.len() as f64;
+            let rule = format!("there is no memory for {particles:.1e} particles: take fewer");
+            return Err(Error::bad("n", n, &rule));
+        };
         for k in 0..cells[2] {
             for j in 0..cells[1] {
                 for i in 0..cells[0] {

@@ -194,6 +194,10 @@ impl Scene {
             let rule = "n, jitter, seed and glass are of a lattice; the particles of a file lie where it says";
             return Err(Error::bad("particles", "a file with words for a lattice", rule));
         }
+        if *glass && *jitter == 0.0 {
+            let rule = "it has no effect on a lattice without disorder, where every push is 0: give jitter, like 0.4";
+            return Err(Error::bad("particles.glass", true, rule));
+        }
         if lattice.is_some() && (n.is_none_or(|n| n == 0) || self.space.is_none()) {
             return Err(Error::bad("particles", "incomplete", "a lattice needs n > 0 and a [box] to fill"));
         }

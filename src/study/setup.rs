@@ -129,7 +129,7 @@ impl Setup<'_> {
             return Err(Error::BadFile { path: path.display().to_string(), reason });
         }
         let before = self.solver.domain().clone();
-        self.solver.set_snapshot(&snapshot)?;
+        self.solver.set_snapshot(&snapshot).map_err(|e| io::in_file(path, e))?;
         let its = self.solver.domain().clone();
         if its != before && self.scene.space.is_some() {
             self.remarks.push("the [box] of the scene takes the place of the file's".into());
@@ -400,7 +400,7 @@ mod tests {
     #[test]
     fn a_glass_needs_a_periodic_box() {
         let mut open = scene("");
-        open.particles.glass = true;
+        (open.particles.glass, open.particles.jitter) = (true, 0.3);
         let text = setup(&open, Path::new(".")).err().unwrap().to_string();
         assert!(text.contains("periodic along every axis"), "{text}");
     }

@@ -204,6 +204,8 @@ fn a_file_is_described_before_it_is_used() {
         (write(&folder, "prose.vtu", "not a file of particles"), "prose.vtu"),
         (write(&folder, "odd.vtu", odd), "x[1] is NaN"),
         (folder.path().join("nowhere.vtu"), "nowhere.vtu"),
+        // The system makes it up while it is read, and would wait for what comes next.
+        ("/proc/kmsg".into(), "/proc/kmsg"),
     ] {
         let answer = ask(program().arg("check").arg(path));
         assert_eq!(answer.code, Some(1), "{expected}");
@@ -231,6 +233,10 @@ fn what_cannot_be_meant_is_answered_with_what_could_be() {
         ("end = 0.02", "end = 0.02\nstep = 3", "did you mean 'steps'"),
         ("hi = [1, 1]", "hi = [1]", "hi has 1 values"),
         ("[time]", "[time", "line "),
+        ("hi = [1, 1]", "hi = [1e308, 1]", "take fewer"),
+        ("n = 60", "n = 1000000000", "take fewer"),
+        ("n = 60", "n = 60\nglass = true", "give jitter"),
+        ("[time]", "[[mark]]\nwhere = {}\nset = { c_v = -1 }\n[time]", "c_v[0] is -1"),
     ] {
         let answer = ask(program().arg("run").arg(changed(from, to)));
         assert_eq!((answer.code, answer.out.as_str()), (Some(2), ""), "{to}: {}", answer.err);
@@ -243,6 +249,9 @@ fn what_cannot_be_meant_is_answered_with_what_could_be() {
         (&["run", sine, "--set", "M4"], "key=value"),
         (&["list", "kernal"], "did you mean 'kernels'"),
         (&["rum"], "run"),
+        (&["run", sine, "--set", "kernel=M4 kernel=M6"], "kernel is given twice"),
+        (&["run", sine, "--set", "kernel=M4", "--set", "kernel=M6"], "kernel is given twice"),
+        (&["run", sine, "--set", "h_fac=1e300"], "another h or h_fac"),
         (&["run", "--jsn"], "--json"),
         (&[], "Usage"),
     ] {
@@ -250,6 +259,8 @@ fn what_cannot_be_meant_is_answered_with_what_could_be() {
         assert_eq!((answer.code, answer.out.as_str()), (Some(2), ""), "{arguments:?}");
         assert!(answer.err.contains(expected), "{arguments:?}: {}", answer.err);
     }
+    let tip = ask(program().args(["plan", "--json"]));
+    assert!(tip.code == Some(2) && !tip.err.contains("tip"), "{}", tip.err);
     for help in [&["--help"][..], &["run", "--help"], &["help", "check"], &["--version"]] {
         let answer = ask(program().args(help));
         assert_eq!((answer.code, answer.err.as_str()), (Some(0), ""), "{help:?}");
