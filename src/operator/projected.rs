@@ -34,7 +34,7 @@ const FLAT: f64 = 1e-6;
 /// Projects the normalised weights of a positive operator.
 ///
 /// # Errors
-/// `NoMemory`.
+/// `NoMemory`; `Cancelled`.
 pub fn project(assembly: &Assembly, matrix: &mut Matrix, pool: &Pool) -> Result<()> {
     match assembly.kernel.dim() {
         1 => project_in::<1, 2>(assembly, matrix, pool),
@@ -128,15 +128,15 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
         let waived = self.one_sided()?;
         // Of all pairs: as good a preconditioner when some are no longer in use.
         let inverse = self.inverse_blocks(&waived)?;
-        let mut defect = self.defect(&lambda, &waived, &mut lacks);
+        let mut defect = self.defect(&lambda, &waived, &mut lacks)?;
         for _ in 0..NEWTON {
             if defect <= TOLERANCE {
                 break;
             }
             let used = self.used(&lambda)?;
             self.solve(&used, &inverse, &mut lacks, &mut next)?;
-            self.each(&mut next, |i, step| *step += lambda[i]);
-            let reached = self.defect(&next, &waived, &mut lacks);
+            self.each(&mut next, |i, step| *step += lambda[i])?;
+            let reached = self.defect(&next, &waived, &mut lacks)?;
             if reached >= defect || reached.is_nan() {
                 break;
             }
@@ -150,8 +150,8 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
         memory::filled("multipliers", self.prior.len(), Vector::zeros())
     }
 
-    fn each<T: Send>(&self, items: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send) {
-        self.pool.chunks(items, BLOCK, |start, part| part.iter_mut().enumerate().for_each(|(k, v)| f(start + k, v)));
+    fn each<T: Send>(&self, items: &mut [T], f: impl Fn(usize, &mut T) + Sync + Send) -> Result<()> {
+        self.pool.make(items, |start, part| part.iter_mut().enumerate().for_each(|(k, v)| f(start + k, v)))
     }
 
     /// The pairs of a particle.
@@ -164,13 +164,17 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
     }
 
     /// Adds up `f(sum, ψ, pair)` over the pairs of each particle.
-    fn over_pairs<T: Copy + Send>(&self, sums: &mut [T], f: impl Fn(&mut T, Psi<D, C>, Pair) + Sync + Send) {
+    fn over_pairs<T: Copy + Send>(
+        &self,
+        sums: &mut [T],
+        f: impl Fn(&mut T, Psi<D, C>, Pair) + Sync + Send,
+    ) -> Result<()> {
         self.each(sums, |a, sum| {
             // A copy, which can stay in registers.
             let mut own = *sum;
             self.pairs(a).for_each(|(psi, pair)| f(&mut own, psi, pair));
             *sum = own;
-        });
+        })
     }
 
     /// Which particles have their neighbours on one side.
@@ -181,7 +185,7 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
             let weight = pair.g * squares::<D>().map(|at| psi[at]).sum::<f64>();
             *moments += psi * weight;
             *total += weight;
-        });
+        })?;
         let skewed = |(moments, total): &(Vector<C>, f64)| {
             let second: f64 = 2.0 * squares::<D>().map(|at| moments[at]).sum::<f64>();
             moments.rows(0, D).norm_squared() > ONE_SIDED * total * second
@@ -190,18 +194,18 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
     }
 
     /// Sets each vector to what moments lack; answers its root mean square.
-    fn defect(&self, lambda: &[Vector<C>], waived: &[bool], lacks: &mut [Vector<C>]) -> f64 {
+    fn defect(&self, lambda: &[Vector<C>], waived: &[bool], lacks: &mut [Vector<C>]) -> Result<f64> {
         lacks.fill(Vector::zeros());
         self.over_pairs(lacks, |lacks, psi, Pair { a, b, g, .. }| {
             *lacks -= psi.0 * (g * factor(&psi, &lambda[a], &lambda[b]));
-        });
+        })?;
         let target = |i: usize| self.volume[i] / (self.unit * self.unit);
         self.each(lacks, |i, lacks| match waived[i] {
             true => lacks.fill(0.0),
             false => *lacks += self.second(i) * target(i),
-        });
+        })?;
         let squared = |i: usize| (lacks[i] / target(i)).norm_squared();
-        (sum::sum(self.pool, lacks.len(), squared) / (lacks.len() * C).max(1) as f64).sqrt()
+        Ok((sum::sum(self.pool, lacks.len(), squared) / (lacks.len() * C).max(1) as f64).sqrt())
     }
 
     /// The moments that a particle is to have, per volume: no first ones, and S or I.
@@ -224,13 +228,16 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
             used.push(memory::filled("pairs in use", apart.len(), false)?);
         }
         self.pool.chunks(&mut used, 1, |block, used| {
+            if self.pool.go_on().is_err() {
+                return;
+            }
             for a in block * BLOCK..((block + 1) * BLOCK).min(self.prior.len()) {
                 for (psi, Pair { b, at, .. }) in self.pairs(a) {
                     used[0][at] = factor(&psi, &lambda[a], &lambda[b]) > 0.0;
                 }
             }
         });
-        Ok(used)
+        self.pool.go_on().map(|()| used)
     }
 
     /// The inverse of each particle's own Σ g ψ ψᵀ; 0 where nothing is to be solved for, or cannot be.
@@ -243,13 +250,13 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
                     block[(l, k)] += psi[l] * (psi[k] * g);
                 }
             }
-        });
+        })?;
         self.each(&mut blocks, |i, block| {
             let spread = block.diagonal();
             let factors = Cholesky::<f64, Const<C>>::new(*block).filter(|_| !waived[i]);
             let safe = |f: &Cholesky<f64, Const<C>>| (0..C).all(|k| f.l_dirty()[(k, k)].powi(2) >= FLAT * spread[k]);
             *block = factors.filter(safe).map_or(Block::zeros(), |f| f.inverse());
-        });
+        })?;
         Ok(blocks)
     }
 
@@ -260,23 +267,22 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
         x.fill(Vector::zeros());
         let mut before = f64::INFINITY;
         for _ in 0..ITERATIONS {
-            self.pool.go_on()?;
-            self.each(&mut z, |i, z| *z = inverse[i] * r[i]);
+            self.each(&mut z, |i, z| *z = inverse[i] * r[i])?;
             let rz = dot(r, &z);
-            self.each(&mut p, |i, p| *p = z[i] + *p * (rz / before));
+            self.each(&mut p, |i, p| *p = z[i] + *p * (rz / before))?;
             q.fill(Vector::zeros());
             self.over_pairs(&mut q, |q, psi, Pair { a, b, at, g }| {
                 if used[a / BLOCK][at] {
                     *q += psi.0 * (g * psi.of(&p[a], &p[b]));
                 }
-            });
+            })?;
             let pq = dot(&p, &q);
             if pq <= 0.0 || pq.is_nan() {
                 break;
             }
             let alpha = rz / pq;
-            self.each(x, |i, x| *x += p[i] * alpha);
-            self.each(r, |i, r| *r -= q[i] * alpha);
+            self.each(x, |i, x| *x += p[i] * alpha)?;
+            self.each(r, |i, r| *r -= q[i] * alpha)?;
             before = rz;
         }
         Ok(())

@@ -359,11 +359,12 @@ pub fn guess(cloud: &Cloud, h_fac: f64, pool: &Pool) -> Result<Vec<f64>> {
         let edge = (cloud.grid.edge * 2f64.powi(low as i32)).max(apart(first)).max(apart(last - 1));
         edge / ((last - first) as f64).powf(1.0 / dim as f64)
     };
-    let least = extent(cloud) * 1e-12;
+    // Coordinates tell nothing shorter apart.
+    let least = |i: usize| cloud.x[..dim].iter().map(|x| f64::EPSILON * x[i].abs()).fold(*LENGTHS.start(), f64::max);
     let mut h = memory::filled("h", cloud.len(), 0.0)?;
     pool.make(&mut h, |start, part| {
         for (k, h) in part.iter_mut().enumerate() {
-            *h = (h_fac * spacing(start + k)).max(least).max(*LENGTHS.start());
+            *h = (h_fac * spacing(start + k)).max(least(start + k));
         }
     })?;
     Ok(h)
@@ -464,6 +465,10 @@ mod tests {
         x.push(1e3);
         let h = solve(&x).unwrap();
         assert!(h.iter().copied().fold(0.0, f64::max) > 100.0 && h.iter().copied().fold(1.0, f64::min) < 2e-6);
+        // However far: what is crowded starts short, or each would look at all the others.
+        x[100] = 1e16;
+        let cloud = Cloud::sort(&Domain::open(1), Strided::packed(&x), 1e-5, &pool).unwrap();
+        assert!(guess(&cloud, 1.2, &pool).unwrap()[..100].iter().all(|h| *h < 1e-4));
         assert!(solve(&[0.0]).unwrap_err().to_string().contains("h[0]"));
         // M4 at 0 is 2/3: a second particle at the same place is more than 1.2 asks for.
         let spaced: Vec<f64> = (0..20).map(f64::from).collect();
