@@ -10,12 +10,11 @@
 //! nothing of insulation and lose or make energy; there and where even order 2 is not safe rows are left to normalised
 //! pairs, for which insulation is the natural boundary.
 
+use super::assembly::Assembly;
 use super::ldl::{LANES, Lanes, Ldl};
-use super::once::{Assembly, Buffers};
 use super::polynomials::{Powers, add, monomials};
 use crate::error::Result;
 use crate::memory;
-use crate::pool::Pool;
 use crate::space::Row;
 
 /// Below this ratio of a pivot to the spread of its monomial neighbours do not tell the monomials apart.
@@ -49,19 +48,6 @@ pub fn fit(assembly: &Assembly, row: &Row, w: &mut [f64], space: &mut Space) -> 
         return unsafe { fit_avx2(assembly, row, w, space) };
     }
     fit_anywhere(assembly, row, w, space)
-}
-
-/// The order that [`fit`] reaches for each particle.
-///
-/// # Errors
-/// `NoMemory`.
-pub fn reached(assembly: &Assembly, pool: &Pool) -> Result<Vec<f64>> {
-    let mut out = memory::filled("orders", assembly.volume.len(), 0.0)?;
-    assembly.rows.map(pool, &mut out, |buffers: &mut Buffers, row: Row| {
-        assembly.weights(&row, buffers)?;
-        Ok(buffers.order.into())
-    })?;
-    Ok(out)
 }
 
 #[cfg(target_arch = "x86_64")]
@@ -225,6 +211,7 @@ mod tests {
     use super::*;
     use crate::array::Strided;
     use crate::kernel::Kernel;
+    use crate::pool::Pool;
     use crate::space::{Cloud, Domain, Scratch, rows::Rows};
 
     #[test]

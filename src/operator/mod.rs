@@ -10,12 +10,13 @@
 //! so energy is exchanged in equal and opposite parts, constants are kept exactly, and where w ≥ 0 a maximum principle
 //! holds.
 //!
-//! Where the conductivity is a tensor kappa S (tr S = nu), an operator either turns S into weights of pairs ([`once`]) or
+//! Where the conductivity is a tensor kappa S (tr S = nu), an operator either turns S into weights of pairs ([`assembly`]) or
 //! takes a gradient, a flux and a divergence ([`twice`]).
 
 pub mod aggregate;
 mod apart;
 pub mod arnoldi;
+pub mod assembly;
 pub mod bypass;
 pub mod consistent;
 pub mod gradient;
@@ -36,11 +37,12 @@ pub mod tensor;
 pub mod twice;
 pub mod walls;
 
+pub use assembly::Assembly;
 pub use matrix::Matrix;
 pub use mean::Mean;
 pub use multigrid::Multigrid;
 pub use normalise::Normalise;
-pub use once::{Assembly, Pairs};
+pub use once::Pairs;
 pub use table::Operator;
 pub use tensor::Sym;
 pub use twice::Twice;

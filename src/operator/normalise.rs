@@ -15,7 +15,7 @@
 //! A direction in which a particle has no neighbours cannot conduct, and asking for it would spoil the others: asked for
 //! are those that are there ([`Asked`]).
 
-use super::once::Assembly;
+use super::assembly::Assembly;
 use super::tensor::{self, AXES, Sym};
 use super::{Matrix, moments};
 use crate::error::Result;

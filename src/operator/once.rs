@@ -4,110 +4,101 @@
 //! The coefficient g_ab = V_a V_b w_ab is symmetric to the bit, so exchanges cancel exactly before rounding of the row
 //! sums. Rows are gathered by their owner in a fixed order.
 
+use super::assembly::{self, Assembly};
 use super::matrix::{Block, Matrix, Seen, row_sum};
 use super::normalise::{self, Normalise, Normals};
-use super::table::{self, Tensor};
-use super::tensor::{self, Sym};
+use super::table::{self, Fit, Join};
 use super::twice::Twice;
-use super::{Mean, Operator, apart, consistent, moments, projected, stencils};
+use super::{Mean, apart, consistent, moments, projected, stencils};
 use crate::error::Result;
-use crate::kernel::Kernel;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
-use crate::space::{Row, Scratch, rows::Rows};
+use crate::space::{Axes, Row, Scratch};
 use crate::sum;
-
-/// What a row of weights is made from.
-#[derive(Clone, Copy)]
-pub struct Assembly<'a> {
-    pub operator: &'static Operator,
-    pub normalise: Normalise,
-    pub kernel: &'a Kernel,
-    pub rows: &'a Rows<'a>,
-    /// Volumes m/rho in internal order.
-    pub volume: &'a [f64],
-    /// One kernel evaluation per pair: every h is the same.
-    pub same_h: bool,
-    /// Of polynomials that consistent weights are exact for: 2, 4 or 6.
-    pub order: u32,
-    /// Take consistent weights as they come, with modes that grow.
-    pub any_row: bool,
-    /// How each particle conducts by direction, trace nu; none where all are isotropic.
-    pub shape: Option<&'a [Sym]>,
-}
 
 /// Buffers of one worker for rows of weights.
 #[derive(Default)]
 pub struct Buffers {
-    q: Vec<f64>,
-    w: Vec<f64>,
-    other: Vec<f64>,
-    spare: Vec<f64>,
+    pairs: assembly::Buffers,
     space: consistent::Space,
     /// That the last row's consistent weights reached.
-    pub order: u32,
+    order: u32,
 }
 
 impl Assembly<'_> {
-    /// w_ab of a row, symmetrised: the mean of the weights with h_a and with h_b, units 1/length^(nu + 2).
+    /// w_ab of a row, fitted to what the operator fits them to.
+    ///
+    /// # Errors
+    /// `NoMemory`.
     pub fn weights<'b>(&self, row: &Row, buffers: &'b mut Buffers) -> Result<&'b [f64]> {
-        let n = row.len();
-        buffers.reserve(n)?;
-        let Buffers { q, w, other, spare, space, order } = buffers;
-        let (q, w, other, spare) = (&mut q[..n], &mut w[..n], &mut other[..n], &mut spare[..n]);
-        let power = self.kernel.dim() as i32 + 2;
-        let h = self.rows.h;
-        let own = 1.0 / h[row.i];
-        q.iter_mut().zip(row.r).for_each(|(q, r)| *q = r * own);
-        (self.operator.weight)(self.kernel, q, w, spare);
-        let scale = own.powi(power);
-        w.iter_mut().for_each(|w| *w *= scale);
-        if matches!(self.operator.tensor, Tensor::Consistent) {
-            *order = consistent::fit(self, row, w, space)?;
-            return Ok(w);
-        }
-        if !self.same_h {
-            let inverse = |j: &u32| 1.0 / h[*j as usize];
-            q.iter_mut().zip(row.r).zip(row.j).for_each(|((q, r), j)| *q = r * inverse(j));
-            (self.operator.weight)(self.kernel, q, other, spare);
-            for ((w, other), j) in w.iter_mut().zip(other).zip(row.j) {
-                *w = 0.5 * (*w + *other * inverse(j).powi(power));
-            }
-        }
-        match (self.operator.tensor, self.shape) {
-            (Tensor::Angular(factor), Some(shape)) => self.turn(row, shape, factor, w),
-            (Tensor::Stencils, _) => stencils::fit(self, row, w),
-            _ => {}
+        let Buffers { pairs, space, order } = buffers;
+        let w = self.pair_weights(row, pairs)?;
+        match self.operator.fit {
+            Fit::Polynomials => *order = consistent::fit(self, row, w, space)?,
+            Fit::Moments => stencils::fit(self, row, w),
+            Fit::None | Fit::Angle(_) => {}
         }
         Ok(w)
     }
 
-    /// Multiplies weights by the angular factor of the mean of both particles' tensors. Coincident particles have no
-    /// direction: theirs is the isotropic weight.
-    fn turn(&self, row: &Row, shape: &[Sym], factor: fn(f64, f64) -> f64, w: &mut [f64]) {
-        let nu = self.kernel.dim() as f64;
-        for (k, (w, &j)) in w.iter_mut().zip(row.j).enumerate() {
-            let e = row.direction(k);
-            if e != [0.0; 3] {
-                let along = 0.5 * (tensor::along(&shape[row.i], e) + tensor::along(&shape[j as usize], e));
-                *w *= factor(along, nu);
-            }
-        }
-    }
-
-    /// The stored matrix, not normalised yet, and what [`normalise::scale`] needs for that: the local second moment
-    /// K_a = Σ_b V_b r² w_ab / (2 nu) of each particle, which is 1 for a perfect Laplacian (Biriukov & Price 2019), and
-    /// beyond.
+    /// The order that consistent weights reach for each particle.
     ///
     /// # Errors
     /// `NoMemory`.
+    pub fn orders(&self, pool: &Pool) -> Result<Vec<f64>> {
+        let mut out = memory::filled("orders", self.volume.len(), 0.0)?;
+        self.rows.map(pool, &mut out, |buffers: &mut Buffers, row: Row| {
+            self.weights(&row, buffers)?;
+            Ok(buffers.order.into())
+        })?;
+        Ok(out)
+    }
+
+    /// h_a Σ_b V_b w_ab (r_b − r_a) for each particle: dimensionless, one component per axis, and 0 for a perfect Laplacian.
+    /// `stored`: where coefficients are not those that the assembly makes of a row.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn first_moments(&self, stored: Option<&Matrix>, pool: &Pool) -> Result<Vec<Axes<f64>>> {
+        let mut out = memory::filled("first moments", self.volume.len(), [0.0; 3])?;
+        self.rows.map(pool, &mut out, |(buffers, made): &mut (Buffers, Vec<f64>), row: Row| {
+            let g = match stored {
+                Some(matrix) => matrix.coefficients(row.i),
+                None => {
+                    made.clear();
+                    made.extend(self.coefficients(&row, self.weights(&row, buffers)?));
+                    made
+                }
+            };
+            let scale = self.rows.h[row.i] / self.volume[row.i];
+            let sum = |d: &[f64]| scale * g.iter().zip(d).map(|(g, d)| g * d).sum::<f64>();
+            Ok(row.d.map(sum))
+        })?;
+        Ok(out)
+    }
+
+    /// The stored matrix, joined and not normalised yet, and what [`normalise::scale`] needs for that.
+    ///
+    /// # Errors
+    /// `NoMemory`; `Cancelled`.
     pub fn store(&self, pool: &Pool) -> Result<(Matrix, Normals)> {
+        let (mut matrix, mut normals) = self.rows(pool)?;
+        self.join(&mut matrix, &mut normals, pool)?;
+        Ok((matrix, normals))
+    }
+
+    /// The rows of the matrix, each by itself, and the local second moment K_a = Σ_b V_b r² w_ab / (2 nu) of each particle,
+    /// which is 1 for a perfect Laplacian (Biriukov & Price 2019), and beyond.
+    ///
+    /// # Errors
+    /// `NoMemory`; `Cancelled`.
+    pub fn rows(&self, pool: &Pool) -> Result<(Matrix, Normals)> {
         let n = self.volume.len();
         let mut blocks = memory::reserved("matrix", n.div_ceil(BLOCK))?;
         let mut normals = Normals {
             moments: memory::reserved("second moments", n)?,
             tensors: memory::reserved("second moments", if self.turns_pairs() { n } else { 0 })?,
-            paired: memory::reserved("rows", if self.is_consistent() { n } else { 0 })?,
+            paired: memory::reserved("rows", if self.may_pair() { n } else { 0 })?,
             defect: None,
         };
         for block in pool.map_init(n.div_ceil(BLOCK), Workspace::default, |space, b| self.block(space, b)) {
@@ -117,26 +108,34 @@ impl Assembly<'_> {
             normals.tensors.extend_from_slice(&k.tensors);
             normals.paired.extend_from_slice(&k.paired);
         }
-        let mut matrix = Matrix::new(n, blocks);
-        match self.operator.tensor {
-            Tensor::Stencils | Tensor::Projected => {
-                if matches!(self.operator.tensor, Tensor::Stencils) {
-                    self.symmetrise(&mut matrix, pool)?;
-                    normals = moments::normals(self, &matrix, pool)?;
+        Ok((Matrix::new(n, blocks), normals))
+    }
+
+    /// What the operator does to all rows together.
+    ///
+    /// # Errors
+    /// `NoMemory`; `Cancelled`.
+    pub fn join(&self, matrix: &mut Matrix, normals: &mut Normals, pool: &Pool) -> Result<()> {
+        match self.operator.join {
+            Join::Projection => {
+                if matches!(self.operator.fit, Fit::Moments) {
+                    self.symmetrise(matrix, pool)?;
+                    *normals = moments::normals(self, matrix, pool)?;
                 }
-                normalise::scale(self, &mut matrix, &normals, pool)?;
-                projected::project(self, &mut matrix, pool)?;
-                let unmet = moments::conduction(self, &matrix, pool)?;
+                normalise::scale(self, matrix, normals, pool)?;
+                projected::project(self, matrix, pool)?;
+                let unmet = moments::conduction(self, matrix, pool)?;
                 let defect = Some(sum::rms(pool, unmet.len(), |_| 1.0, |i| unmet[i]));
-                normals = Normals { defect, ..moments::normals(self, &matrix, pool)? };
+                *normals = Normals { defect, ..moments::normals(self, matrix, pool)? };
             }
-            Tensor::Consistent if normals.paired.contains(&true) => {
-                self.pair_up(&mut matrix, &normals.paired, pool)?;
-                normals = Normals { paired: normals.paired, ..moments::normals(self, &matrix, pool)? };
+            Join::Pairs if normals.paired.contains(&true) => {
+                self.pair_up(matrix, &normals.paired, pool)?;
+                let paired = std::mem::take(&mut normals.paired);
+                *normals = Normals { paired, ..moments::normals(self, matrix, pool)? };
             }
             _ => {}
         }
-        Ok((matrix, normals))
+        Ok(())
     }
 
     /// Normalises what [`Assembly::store`] made, where that is not done yet.
@@ -147,13 +146,8 @@ impl Assembly<'_> {
         if self.operator.is_projected() { Ok(()) } else { normalise::scale(self, matrix, normals, pool) }
     }
 
-    /// Whether rows are to be normalised by direction.
-    pub fn turns_pairs(&self) -> bool {
-        self.normalise == Normalise::Tensor && self.kernel.dim() > 1
-    }
-
-    fn is_consistent(&self) -> bool {
-        matches!(self.operator.tensor, Tensor::Consistent)
+    fn may_pair(&self) -> bool {
+        self.operator.join == Join::Pairs
     }
 
     /// Puts normalised pairs into some rows.
@@ -225,12 +219,6 @@ impl Assembly<'_> {
         })
     }
 
-    /// g_ab = V_a V_b w_ab of a row.
-    pub fn coefficients<'b>(&'b self, row: &'b Row, w: &'b [f64]) -> impl Iterator<Item = f64> + 'b {
-        let (volume, own) = (self.volume, self.volume[row.i]);
-        row.j.iter().zip(w).map(move |(&j, w)| (own * volume[j as usize]) * w)
-    }
-
     fn block(&self, space: &mut Workspace, b: usize) -> Result<(Block, Normals)> {
         let range = b * BLOCK..((b + 1) * BLOCK).min(self.volume.len());
         let Workspace { scratch, buffers, seen, pairs } = space;
@@ -241,7 +229,7 @@ impl Assembly<'_> {
         let mut normals = Normals {
             moments: memory::reserved("second moments", range.len())?,
             tensors: memory::reserved("second moments", if self.turns_pairs() { range.len() } else { 0 })?,
-            paired: memory::reserved("rows", if self.is_consistent() { range.len() } else { 0 })?,
+            paired: memory::reserved("rows", if self.may_pair() { range.len() } else { 0 })?,
             defect: None,
         };
         let dim = self.kernel.dim() as f64;
@@ -256,7 +244,7 @@ impl Assembly<'_> {
             if self.turns_pairs() {
                 normals.tensors.push(normalise::tensor_of(self, &row, &coef[from..]));
             }
-            if self.is_consistent() {
+            if self.may_pair() {
                 normals.paired.push(buffers.order == 0);
             }
             start.push(col.len() as u32);
@@ -274,15 +262,6 @@ struct Workspace {
     seen: Seen,
     /// Room for the pairs of a block.
     pairs: usize,
-}
-
-impl Buffers {
-    fn reserve(&mut self, n: usize) -> Result<()> {
-        for v in [&mut self.q, &mut self.w, &mut self.other, &mut self.spare] {
-            memory::extended("a row of weights", v, n, 0.0)?;
-        }
-        Ok(())
-    }
 }
 
 /// Pair sums, from stored weights or from weights made on the way.

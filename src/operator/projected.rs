@@ -11,7 +11,7 @@
 //! Where neighbours are on one side, at a free surface, the conditions cannot hold, and insulation is natural: there λ
 //! stays 0.
 
-use super::once::Assembly;
+use super::assembly::Assembly;
 use super::tensor::{self, Sym};
 use super::{Matrix, apart};
 use crate::error::Result;
@@ -55,7 +55,7 @@ fn project_in<const D: usize, const C: usize>(assembly: &Assembly, matrix: &mut 
     let unit = sum::max(pool, n, |i| assembly.rows.h[i]);
     // Single precision holds the conditions to 1e-7.
     let apart = apart::of(assembly.rows, unit, pool)?;
-    let shape = assembly.shape.filter(|_| assembly.operator.takes_tensors());
+    let shape = assembly.shape.filter(|_| assembly.operator.takes_tensors);
     let problem = Problem::<D, C> { pool, prior: matrix, apart: &apart, volume: assembly.volume, unit, shape };
     let lambda = problem.newton()?;
     let (apart, lambda) = (&apart[..], &lambda[..]);

@@ -7,7 +7,7 @@
 //! Newton's method. A tensor that no positive weights on these neighbours can have (kappa_perp = 0) is met as nearly as
 //! eps allows: smaller leaks less across b, and makes sparser, more irregular stencils.
 
-use super::once::Assembly;
+use super::assembly::Assembly;
 use super::tensor::{self, Sym};
 use crate::space::Row;
 use nalgebra::{SMatrix, SVector};

@@ -9,8 +9,9 @@
 //!
 //! Where layers behind a wall fill the support, nothing changes.
 
+use super::assembly::Assembly;
 use super::normalise::{self, Normals};
-use super::{Assembly, Matrix, moments};
+use super::{Matrix, moments};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::Pool;

@@ -3,7 +3,6 @@
 
 use super::Choices;
 use crate::error::{Error, Result};
-use crate::operator::table::Tensor;
 
 struct Row {
     word: &'static str,
@@ -27,7 +26,7 @@ fn gives_stages(c: &Choices) -> bool {
 }
 
 fn is_twice(c: &Choices) -> bool {
-    matches!(c.operator.tensor, Tensor::Twice { .. })
+    !c.operator.is_one_matrix()
 }
 
 const SOLVES: &str =
@@ -35,15 +34,15 @@ const SOLVES: &str =
 
 #[rustfmt::skip]
 static ROWS: &[Row] = &[
-    Row { word: "order", applies: |c, _| matches!(c.operator.tensor, Tensor::Consistent), needs: "operator=consistent" },
+    Row { word: "order", applies: |c, _| c.operator.is_exact(), needs: "operator=consistent" },
     Row { word: "theta", applies: |c, _| is_twice(c), needs: "operator=two-first or limited" },
     Row { word: "gradient", applies: |c, _| is_twice(c), needs: "operator=two-first or limited" },
     Row { word: "allow", applies: |c, v| !says(v, "unstable") || !(c.operator.positive || c.operator.dissipative),
           needs: "for 'unstable' an operator that may have growing modes: direct, consistent or espanol-revenga" },
-    Row { word: "allow", applies: |c, v| !says(v, "energy") || matches!(c.operator.tensor, Tensor::Consistent),
+    Row { word: "allow", applies: |c, v| !says(v, "energy") || !c.operator.conserves,
           needs: "for 'energy' operator=consistent" },
     Row { word: "allow", applies: |c, v| !says(v, "flat") || c.kernel.dim() > 1, needs: "for 'flat' dim=2 or 3" },
-    Row { word: "normalise", applies: |c, v| says(v, "none") || !matches!(c.operator.tensor, Tensor::Consistent),
+    Row { word: "normalise", applies: |c, v| says(v, "none") || !c.operator.is_exact(),
           needs: "an operator whose weights are not exact already" },
     Row { word: "stages", applies: |c, _| has_stages(c), needs: "integrator=rkl1, rkl2 or auto" },
     Row { word: "max_stages", applies: |c, _| has_stages(c), needs: "integrator=rkl1, rkl2 or auto" },

@@ -9,7 +9,7 @@ use crate::integrator::{self, Method, Options};
 use crate::kernel::Kernel;
 use crate::model::MODELS;
 use crate::operator::normalise::NORMALISATIONS;
-use crate::operator::table::{self, Tensor};
+use crate::operator::table;
 use crate::operator::{Mean, Normalise, Operator};
 use crate::words::{Words, choice};
 
@@ -175,7 +175,7 @@ impl Choices {
             Some(word) => choice("normalise", word, NORMALISATIONS)?,
         };
         let mean = words.take("mean").map(Mean::find).transpose()?;
-        if mean == Some(Mean::Geometric) && matches!(operator.tensor, Tensor::Twice { .. }) {
+        if mean == Some(Mean::Geometric) && !operator.is_one_matrix() {
             let rule =
                 format!("operator={} knows harmonic and arithmetic means: two gradients have no other", operator.name);
             return Err(Error::bad("mean", "geometric", &rule));
@@ -258,7 +258,7 @@ fn options(words: &mut Words, operator: &Operator, unstable: bool) -> Result<(Op
     let mut options = Options { max_applications: 10_000_000, ..Options::default() };
     options.stages = words.count("stages", 1..=10_000)?.map(|s| s as u32);
     // Beyond what it is positive for, only who insists gets weights of Espanol & Revenga.
-    let able = operator.positive || (matches!(operator.tensor, Tensor::Angular(_)) && !unstable);
+    let able = operator.positive || (operator.has_angle() && !unstable);
     let bounds = match words.take("bounds") {
         None if able => Promise::Kept,
         None => Promise::Watched,

@@ -2,7 +2,7 @@
 
 use super::report::{Report, Timers};
 use super::state::Progress;
-use super::{Choices, Plan, rules};
+use super::{Choices, Plan, passes, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{
     self, Adaptive, Bounds, Control, Linear, Method, Range, Schedule, Shifted, System, Tally, Work,
@@ -126,7 +126,7 @@ impl Motion<'_> {
             true => self.march(time, dt, t, report)?,
             false => self.adapt(time, dt, t, report)?,
         }
-        self.timers.add(if method.is_implicit() { "solve" } else { "stages" }, start.elapsed());
+        self.timers.add(if method.is_implicit() { &passes::SOLVE } else { &passes::STAGES }, start.elapsed());
         Ok(())
     }
 
@@ -309,7 +309,7 @@ impl Motion<'_> {
         let enough = self.plan.leaves_out(&rules::PROVEN_BOUND) && self.is_least_work(dt, known, cooling);
         let bounds = if enough { known.proven } else { self.refined(known, time, t)? };
         let bounds = raised(bounds, cooling);
-        self.timers.add("bound", start.elapsed());
+        self.timers.add(&passes::BOUND, start.elapsed());
         Ok(bounds)
     }
 
@@ -379,7 +379,7 @@ impl Motion<'_> {
     fn refuse_growing_modes(&mut self, time: f64, t: &[f64]) -> Result<()> {
         let start = Instant::now();
         let (growth, fastest) = self.growth(time, t)?;
-        self.timers.add("spectrum", start.elapsed());
+        self.timers.add(&passes::SPECTRUM, start.elapsed());
         if growth <= GROWS * fastest || self.choices.allow.unstable {
             return Ok(());
         }
@@ -406,7 +406,7 @@ impl Motion<'_> {
         let proven = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
         // An eigenvalue of a symmetric operator is at least the largest diagonal element; of others nothing is known.
         let floor = if self.choices.operator.dissipative { largest(|c| c.1) } else { 0.0 };
-        self.timers.add("circles", start.elapsed());
+        self.timers.add(&passes::CIRCLES, start.elapsed());
         match proven.spectral.is_finite() {
             true => Ok(Known { proven, refined: None, floor }),
             false => Err(Error::bad("kappa", "too large", "its product with the pair weights exceeds all numbers")),

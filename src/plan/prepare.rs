@@ -1,7 +1,7 @@
-//! The passes that make what the stages need: sort, density, weights, normalise, fold, capacity, surface, bound. Each
-//! runs only where its product is missing.
+//! What the passes of set-up do: each makes something that stages need, where it is missing.
 
 use super::motion::Motion;
+use super::passes::{self, Pass};
 use super::state::{Directions, Geometry, Input, State, Weights, least};
 use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
@@ -11,10 +11,11 @@ use crate::model::fields::{self, FIELDS, INPUTS, Slot};
 use crate::model::heat::{Conductivity, Heat, Power, Release};
 use crate::model::surface::{Exchange, Surface};
 use crate::model::tensor::Tensor;
-use crate::operator::table::{self, OPERATORS, Tensor as Form};
+use crate::operator::normalise::Normals;
+use crate::operator::table::{self, Fit, OPERATORS, Sweeps};
 use crate::operator::twice::Recipe;
 use crate::operator::walls::Walls;
-use crate::operator::{Assembly, Matrix, Multigrid, Normalise, Pairs, Sym, Twice, bypass, tensor};
+use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, bypass, tensor};
 use crate::space::{density, rows::Rows};
 use std::borrow::Cow;
 
@@ -51,9 +52,19 @@ impl State {
             self.refuse_weights_without_room(self.fewest_neighbours())?;
         }
         let plan = self.prepare_fresh(call)?;
-        self.prepare_weights(&plan)?;
-        self.fold_kappa(&plan)?;
+        self.make(&plan, |_| true)?;
         Ok(plan)
+    }
+
+    /// Runs the passes of the plan that make something.
+    fn make(&mut self, plan: &Plan, wanted: impl Fn(&Pass) -> bool) -> Result<()> {
+        for pass in plan.passes.iter().map(|line| line.pass).filter(|pass| wanted(pass)) {
+            let start = std::time::Instant::now();
+            if pass.make.map_or(Ok(false), |make| make(self, plan))? {
+                self.timers.add(pass, start.elapsed());
+            }
+        }
+        Ok(())
     }
 
     /// The same without stored weights: enough for one application.
@@ -91,13 +102,13 @@ impl State {
         let at = |slot: Slot, i: usize| self.inputs[slot].at(i).unwrap_or(0.0);
         let Some(tensor) = Tensor::read(n, dim, set, at, |i| self.host(i))? else { return Ok(()) };
         let isotropic = tensor.is_isotropic(dim);
-        match choices.operator.tensor {
-            _ if !isotropic && !choices.operator.takes_tensors() => {
-                let able = OPERATORS.iter().filter(|o| o.takes_tensors()).map(|o| o.name);
+        match choices.operator.fit {
+            _ if !isotropic && !choices.operator.takes_tensors => {
+                let able = OPERATORS.iter().filter(|o| o.takes_tensors).map(|o| o.name);
                 let rule = format!("it takes no tensor kappa; use {}", able.collect::<Vec<_>>().join(", "));
                 return Err(Error::bad("operator", choices.operator.name, &rule));
             }
-            Form::Angular(_) if !choices.allow.unstable => {
+            Fit::Angle(_) if !choices.allow.unstable => {
                 if let Some(i) = tensor.beyond_espanol_revenga(dim) {
                     let value = format!("{:?} times {}", tensor.shape[i], tensor.kappa[i]);
                     let rule = "more anisotropic than kappa_par = 3 kappa_perp, so weights of pairs across b are negative \
@@ -132,10 +143,10 @@ impl State {
             let made = self.make_geometry(call, true);
             self.inputs[fields::H] = Input::Unset;
             self.geometry = Some(made?);
-            self.timers.add("density", start.elapsed());
+            self.timers.add(&passes::DENSITY, start.elapsed());
         } else {
             self.geometry = Some(self.make_geometry(call, false)?);
-            self.timers.add("sort", start.elapsed());
+            self.timers.add(&passes::SORT, start.elapsed());
         }
         Ok(())
     }
@@ -239,7 +250,7 @@ impl State {
     /// Whether the operator is wrong in sheets and strings of one layer: two gradients see noise across them, and weights
     /// that are scaled in the mean over directions conduct too well along them.
     fn needs_thickness(&self) -> bool {
-        matches!(self.choices.operator.tensor, Form::Twice { .. } | Form::Stencils)
+        !self.choices.operator.is_one_matrix() || matches!(self.choices.operator.fit, Fit::Moments)
     }
 
     /// h as given, or h_fac (m/rho)^(1/nu).
@@ -324,43 +335,81 @@ impl State {
         Ok(())
     }
 
-    fn prepare_weights(&mut self, plan: &Plan) -> Result<()> {
+    /// Rows of weights, each by itself.
+    pub(super) fn make_weights(&mut self, plan: &Plan) -> Result<bool> {
         if self.weights.is_some() {
-            return Ok(());
+            return Ok(false);
         }
         self.refuse_weights_without_room(self.geometry.as_ref().map_or(0.0, |g| g.neighbours))?;
-        let start = std::time::Instant::now();
-        let same_h = plan.leaves_out(&rules::SAME_H);
-        let (matrix, moments, (defect, paired), made) = self.with_assembly(same_h, |a| {
-            let (mut matrix, mut normals) = a.store(&self.pool)?;
-            let (made, moments) = (std::time::Instant::now(), memory::copied("second moments", &normals.moments)?);
-            if a.normalise != Normalise::No {
-                self.at_walls(|walls| walls.complete_normals(a, &matrix, &mut normals))?;
-                a.normalise(&mut matrix, &normals, &self.pool)?;
+        let (matrix, normals) = self.with_assembly(plan.leaves_out(&rules::SAME_H), |a| a.rows(&self.pool))?;
+        let moments = Vec::new();
+        let normals = Some(normals);
+        self.weights =
+            Some(Weights { matrix, normals, twice: None, moments, defect: None, paired: false, folded: false });
+        Ok(true)
+    }
+
+    pub(super) fn join_weights(&mut self, plan: &Plan) -> Result<bool> {
+        self.change_weights(plan, |state, a, Weights { matrix, normals, .. }| match normals {
+            Some(normals) => a.join(matrix, normals, &state.pool),
+            None => Ok(()),
+        })
+    }
+
+    pub(super) fn normalise_weights(&mut self, plan: &Plan) -> Result<bool> {
+        self.change_weights(plan, |state, a, Weights { matrix, normals, moments, .. }| {
+            let Some(normals) = normals else { return Ok(()) };
+            *moments = memory::copied("second moments", &normals.moments)?;
+            state.at_walls(|walls| walls.complete_normals(a, matrix, normals))?;
+            a.normalise(matrix, normals, &state.pool)
+        })
+    }
+
+    pub(super) fn complete_walls(&mut self, plan: &Plan) -> Result<bool> {
+        self.change_weights(plan, |state, _, Weights { matrix, .. }| state.at_walls(|walls| walls.complete(matrix)))
+    }
+
+    /// What an operator of two sweeps holds beside the weights of pairs.
+    pub(super) fn make_sweeps(&mut self, plan: &Plan) -> Result<bool> {
+        self.change_weights(plan, |state, a, weights| {
+            weights.twice = Some(state.twice(a)?);
+            Ok(())
+        })
+    }
+
+    /// Weights that are made are those of a step, if they are numbers and volumes fit distances.
+    pub(super) fn trust_weights(&mut self, plan: &Plan) -> Result<bool> {
+        self.change_weights(plan, |state, _, weights| {
+            if let Some(i) = weights.matrix.first_bad(&state.pool) {
+                let what = "a pair weight".to_string();
+                return Err(Error::NotFinite { what, index: state.host(i), value: f64::NAN });
             }
-            self.at_walls(|walls| walls.complete(&mut matrix))?;
-            Ok((matrix, moments, (normals.defect, normals.paired.contains(&true)), made))
-        })?;
-        self.timers.add("weights", made - start);
-        self.timers.add("normalise", made.elapsed());
-        if let (Some(i), Some(cloud)) = (matrix.first_bad(&self.pool), &self.cloud) {
-            let what = "a pair weight".to_string();
-            return Err(Error::NotFinite { what, index: cloud.host[i] as usize, value: f64::NAN });
-        }
-        self.refuse_wrong_volumes(&matrix, &moments)?;
-        let twice = match self.choices.operator.tensor {
-            Form::Twice { limited } => Some(self.make_twice(plan, limited)?),
-            _ => None,
-        };
-        self.weights = Some(Weights { matrix, twice, moments, defect, paired, folded: false });
-        Ok(())
+            let Some(Normals { moments, paired, defect, .. }) = weights.normals.take() else { return Ok(()) };
+            if weights.moments.is_empty() {
+                weights.moments = moments;
+            }
+            (weights.paired, weights.defect) = (paired.contains(&true), defect);
+            state.refuse_wrong_volumes(&weights.matrix, &weights.moments)
+        })
+    }
+
+    /// Calls `change` with weights that are being made; they are given up where it fails.
+    fn change_weights(
+        &mut self,
+        plan: &Plan,
+        change: impl FnOnce(&State, &Assembly, &mut Weights) -> Result<()>,
+    ) -> Result<bool> {
+        let Some(mut weights) = self.weights.take_if(|w| w.normals.is_some()) else { return Ok(false) };
+        self.with_assembly(plan.leaves_out(&rules::SAME_H), |a| change(self, a, &mut weights))?;
+        self.weights = Some(weights);
+        Ok(true)
     }
 
     /// Weights as they are before kappa is folded into them.
     pub fn prepare_unfolded(&mut self, call: &str) -> Result<&Weights> {
         let plan = self.prepare_fresh(call)?;
         self.weights = self.weights.take().filter(|w| !w.folded);
-        self.prepare_weights(&plan)?;
+        self.make(&plan, |pass| *pass != passes::FOLD)?;
         self.weights.as_ref().ok_or(Error::OutOfOrder { call: call.into(), missing: "set_particles".into() })
     }
 
@@ -398,26 +447,22 @@ impl State {
         self.with_rows(|rows| work(&Walls { rows, volume, fixed: &fixed, pool }))
     }
 
-    /// What an operator of two sweeps holds beside the weights of pairs.
-    fn make_twice(&mut self, plan: &Plan, limited: bool) -> Result<Twice> {
-        let start = std::time::Instant::now();
-        let (mass, same_h, choices) = (self.each(fields::M)?, plan.leaves_out(&rules::SAME_H), &self.choices);
-        let low = match limited {
-            true => Some(self.monotone_weights(same_h)?),
-            false => None,
+    fn twice(&self, assembly: &Assembly) -> Result<Twice> {
+        let (mass, choices) = (self.each(fields::M)?, &self.choices);
+        let low = match choices.operator.sweeps {
+            Sweeps::Two { limited: true } => Some(self.monotone_weights(assembly)?),
+            _ => None,
         };
         let plain = if choices.corrected { None } else { Some(self.inverse_density(&mass)?) };
         let recipe = Recipe { mass: &mass, plain: plain.as_deref(), theta: choices.theta, low };
-        let made = self.with_assembly(same_h, |assembly| Twice::store(assembly, recipe, &self.pool))?;
-        self.timers.add("weights", start.elapsed());
-        Ok(made)
+        Twice::store(assembly, recipe, &self.pool)
     }
 
     /// The operator `monotone` on these particles, whatever the one that was chosen.
-    fn monotone_weights(&self, same_h: bool) -> Result<Matrix> {
+    fn monotone_weights(&self, assembly: &Assembly) -> Result<Matrix> {
         let operator = table::find("monotone")?;
-        let fitted = |a: &Assembly| Assembly { operator, normalise: operator.normalise, ..*a }.store(&self.pool);
-        Ok(self.with_assembly(same_h, fitted)?.0)
+        let (matrix, _) = Assembly { operator, normalise: operator.normalise, ..*assembly }.store(&self.pool)?;
+        Ok(matrix)
     }
 
     /// 1/(Omega rho)
@@ -427,16 +472,16 @@ impl State {
         memory::collected("densities", omega.iter().zip(rho).map(|(omega, rho)| 1.0 / (omega * rho)))
     }
 
-    fn fold_kappa(&mut self, plan: &Plan) -> Result<()> {
-        let fold = plan.leaves_out(&rules::FROZEN) && !plan.leaves_out(&rules::UNIFORM_KAPPA);
-        let kappa = if fold { self.each_kappa()? } else { Vec::new() };
-        let (mean, pool) = (self.mean(), &self.pool);
-        if let Some(weights) = self.weights.as_mut().filter(|w| fold && !w.folded) {
-            let kappa = &kappa[..];
-            self.timers.time("fold", || weights.matrix.scale(pool, move |a, b| mean.of(kappa[a], kappa[b])));
+    pub(super) fn fold_kappa(&mut self, _: &Plan) -> Result<bool> {
+        if self.weights.as_ref().is_none_or(|w| w.folded) {
+            return Ok(false);
+        }
+        let (kappa, mean) = (self.each_kappa()?, self.mean());
+        if let Some(weights) = &mut self.weights {
+            weights.matrix.scale(&self.pool, |a, b| mean.of(kappa[a], kappa[b]));
             weights.folded = true;
         }
-        Ok(())
+        Ok(true)
     }
 
     fn prepare_capacity(&mut self) -> Result<()> {

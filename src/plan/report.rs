@@ -1,5 +1,6 @@
 //! What a step did, and what it took.
 
+use super::passes::Pass;
 use crate::integrator::Tally;
 use std::time::{Duration, Instant};
 
@@ -47,20 +48,20 @@ impl Report {
 /// Seconds per pass and how often it ran, summed over the life of a solver.
 #[derive(Debug, Clone, Default)]
 pub struct Timers {
-    list: Vec<(&'static str, Duration, u64)>,
+    list: Vec<(&'static Pass, Duration, u64)>,
 }
 
 impl Timers {
-    /// Runs a pass on the clock of its name.
-    pub fn time<T>(&mut self, pass: &'static str, work: impl FnOnce() -> T) -> T {
+    /// Runs a pass on its clock.
+    pub fn time<T>(&mut self, pass: &'static Pass, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
         self.add(pass, start.elapsed());
         result
     }
 
-    pub fn add(&mut self, pass: &'static str, spent: Duration) {
-        match self.list.iter_mut().find(|(name, ..)| *name == pass) {
+    pub fn add(&mut self, pass: &'static Pass, spent: Duration) {
+        match self.list.iter_mut().find(|(timed, ..)| *timed == pass) {
             Some((_, total, runs)) => (*total, *runs) = (*total + spent, *runs + 1),
             None => self.list.push((pass, spent, 1)),
         }
@@ -68,11 +69,11 @@ impl Timers {
 
     /// Passes in the order in which they first ran, with seconds.
     pub fn seconds(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.list.iter().map(|(name, spent, _)| (*name, spent.as_secs_f64()))
+        self.list.iter().map(|(pass, spent, _)| (pass.name, spent.as_secs_f64()))
     }
 
     /// How often a pass ran.
     pub fn runs(&self, pass: &str) -> u64 {
-        self.list.iter().find(|(name, ..)| *name == pass).map_or(0, |(.., runs)| *runs)
+        self.list.iter().find(|(timed, ..)| timed.name == pass).map_or(0, |(.., runs)| *runs)
     }
 }

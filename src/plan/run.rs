@@ -4,13 +4,12 @@ use super::choices::Promise;
 use super::input::Energy;
 use super::motion::explicit_limit;
 use super::state::{Input, Made, State};
-use super::{Choices, Plan, Report, rules};
+use super::{Choices, Plan, Report, passes, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{Bounds, Range};
 use crate::memory;
 use crate::model::fields::{self, Slot};
 use crate::model::heat;
-use crate::operator::table::Tensor;
 use crate::sum;
 use std::time::Instant;
 
@@ -81,7 +80,7 @@ impl State {
             report.heat_fixed = report.energy - report.energy_before - came_in;
         }
         let made = self.made_by(dt, &t, report.energy - report.energy_before)?;
-        self.timers.add("check", checked.elapsed());
+        self.timers.add(&passes::CHECK, checked.elapsed());
 
         (self.inputs[fields::T], self.made) = (Input::Each(t), made);
         if self.energy != Energy::Follows {
@@ -219,7 +218,7 @@ impl State {
     fn spread(&mut self, t: &[f64]) -> f64 {
         let (Some(inverse), pool) = (&self.inverse_capacity, &self.pool) else { return 0.0 };
         let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
-        self.timers.time("norm", || sum::spread(pool, t.len(), weight, |i| t[i]))
+        self.timers.time(&passes::NORM, || sum::spread(pool, t.len(), weight, |i| t[i]))
     }
 
     /// The host's number of a particle.
@@ -232,7 +231,7 @@ impl State {
     fn made_by(&self, dt: f64, after: &[f64], energy: f64) -> Result<Made> {
         let open =
             self.exchanging() > 0 || self.source_host.is_some() || self.inputs[fields::FIXED] != Input::Number(0.0);
-        if open || !matches!(self.choices.operator.tensor, Tensor::Consistent) {
+        if open || self.choices.operator.conserves {
             return Ok(Made::default());
         }
         let (before, released) = (self.each(fields::T)?, dt * self.released());

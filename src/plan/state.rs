@@ -15,7 +15,7 @@ use crate::model::conductivity::Law;
 use crate::model::fields::{self, INPUTS, Slot};
 use crate::model::heat::Callback;
 use crate::model::surface::Surface;
-use crate::operator::table::Tensor;
+use crate::operator::normalise::Normals;
 use crate::operator::{Matrix, Mean, Multigrid, Normalise, Sym, Twice};
 use crate::pool::Pool;
 use crate::space::{Cloud, Domain, facing};
@@ -41,6 +41,8 @@ pub struct Directions {
 /// The stored operator.
 pub struct Weights {
     pub matrix: Matrix,
+    /// What they are still to be joined and normalised by, as long as they are being made.
+    pub normals: Option<Normals>,
     /// What operators of two sweeps hold beside the weights of pairs.
     pub twice: Option<Twice>,
     /// K_a before normalisation.
@@ -399,7 +401,7 @@ impl State {
         let choices = &self.choices;
         let (heated, exchanging) = (self.heated(), self.exchanging());
         // Espanol & Revenga's weights were checked, unless the host insists.
-        let turned = matches!(choices.operator.tensor, Tensor::Angular(_)) && !choices.allow.unstable;
+        let turned = choices.operator.has_angle() && !choices.allow.unstable;
         let positive = choices.operator.positive || turned;
         Facts {
             n: self.len(),
@@ -418,7 +420,7 @@ impl State {
             rate_only: self.rates > 0 && self.steps == 0,
             normalised: choices.normalise != Normalise::No,
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),
-            twice: matches!(choices.operator.tensor, Tensor::Twice { .. }),
+            twice: !choices.operator.is_one_matrix(),
             defect: self.weights.as_ref().and_then(|w| w.defect),
             may_grow: !positive && !choices.operator.dissipative && !choices.allow.unstable,
             joined: choices.operator.joins_rows(),

@@ -62,7 +62,7 @@ fn filled_in(about: &str) -> String {
         ("{kernels}", join(kernel::catalogue().map(|k| k.0).collect())),
         ("{h_fac}", kernel::own_h_fac().map(own).collect::<Vec<_>>().join(", ")),
         ("{operators}", join(OPERATORS.iter().map(|o| o.name).collect())),
-        ("{tensors}", join(OPERATORS.iter().filter(|o| o.takes_tensors()).map(|o| o.name).collect())),
+        ("{tensors}", join(OPERATORS.iter().filter(|o| o.takes_tensors).map(|o| o.name).collect())),
         ("{integrators}", join(integrators().map(|i| i.0).collect())),
     ] {
         text = text.replace(hole, &names);

@@ -5,8 +5,7 @@ use crate::array::StridedMut;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, Field, Slot};
-use crate::operator::table::Tensor;
-use crate::operator::{consistent, gradient, moments, tensor};
+use crate::operator::{gradient, moments, tensor};
 use crate::plan::state::{Input, State, Weights};
 use crate::space::density;
 use crate::sum;
@@ -114,8 +113,7 @@ impl Solver {
                 state.growth(&t)?
             }
             "lowered_orders" => {
-                let consistent = matches!(state.choices.operator.tensor, Tensor::Consistent);
-                let asked = if consistent { state.choices.order.into() } else { 0.0 };
+                let asked = if state.choices.operator.is_exact() { state.choices.order.into() } else { 0.0 };
                 orders(state)?.into_iter().filter(|&order| order < asked).count() as f64
             }
             "ghost_supports" => state.ghost_supports(),
@@ -140,7 +138,7 @@ fn values(state: &mut State, field: &Field) -> Result<Vec<Vec<f64>>> {
                 state.prepare_unfolded("get")?;
             }
             let stored = state.weights.as_ref().filter(|_| joined).map(|w| &w.matrix);
-            let found = state.with_assembly(same_h, |a| moments::first(a, stored, &state.pool))?;
+            let found = state.with_assembly(same_h, |a| a.first_moments(stored, &state.pool))?;
             return columns(&found, state.dim());
         }
         "grad_T" => {
@@ -225,7 +223,7 @@ fn conduction(state: &mut State) -> Result<Vec<f64>> {
 /// The order of each particle's consistent weights; 0 where others are used.
 fn orders(state: &mut State) -> Result<Vec<f64>> {
     let same_h = geometry(state)?.same_h;
-    state.with_assembly(same_h, |a| consistent::reached(a, &state.pool))
+    state.with_assembly(same_h, |a| a.orders(&state.pool))
 }
 
 /// The gradient, by components, of what rises by `rise(a, b)` from a particle to its neighbour.
@@ -242,7 +240,7 @@ fn flux(state: &mut State) -> Result<Vec<Vec<f64>>> {
     // First, since it may put the particles in another order.
     geometry(state)?;
     let (t, kappa, mean) = (given(state, fields::T)?, state.kappa_now()?, state.mean());
-    let by_pair = !matches!(state.choices.operator.tensor, Tensor::Twice { .. });
+    let by_pair = state.choices.operator.is_one_matrix();
     let mut flux = gradient_of(state, |a, b| match by_pair {
         true => mean.of(kappa[a], kappa[b]) * (t[a] - t[b]),
         false => kappa[a] * mean.share(kappa[a], kappa[b]) * (t[a] - t[b]),

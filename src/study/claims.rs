@@ -14,7 +14,7 @@ use super::scene::{Exact, Numbers, Value};
 use super::sod::{EQUAL, Shock, correlations, tubes};
 use super::table::{Table, column, short};
 use crate::error::Result;
-use crate::operator::table::{OPERATORS, Tensor};
+use crate::operator::table::OPERATORS;
 use std::path::Path;
 
 /// Checks a sentence: says the answer, adds its numbers.
@@ -84,7 +84,7 @@ fn anisotropic(page: &mut Page, table: &mut Table, request: &Request, _: &[Sampl
     table.push([claim.into(), SQUARE.name.into(), 0.0.into(), grows.into(), f64::NAN.into()]);
     let (sizes, seeds) = request.pick(([8, 32], 1), ([16, 64], 3), ([32, 128], 5));
     let (mut other, mut twice, mut stuck, mut unstable) = (Vec::new(), Vec::new(), Vec::new(), Vec::new());
-    for operator in OPERATORS.iter().filter(|o| o.takes_tensors()) {
+    for operator in OPERATORS.iter().filter(|o| o.takes_tensors) {
         let error = |n: usize, waves| -> Result<f64> {
             let found = (1..=seeds).map(|seed| tensor_error(operator.name, n, seed, waves));
             Ok(spread(&found.collect::<Result<Vec<_>>>()?)[0])
@@ -106,11 +106,11 @@ fn anisotropic(page: &mut Page, table: &mut Table, request: &Request, _: &[Sampl
         // Four times the resolution: what converges at first order falls by four, what does not converge by nothing.
         let said =
             format!("{} (errors along and across fall by {} and {})", operator.name, short(falls[0]), short(falls[1]));
-        match operator.tensor {
+        match operator.is_one_matrix() {
             _ if !falls.iter().all(|fall| fall.is_finite()) => unstable.push(operator.name),
             _ if falls.iter().any(|fall| *fall < 1.5) => stuck.push(said),
-            Tensor::Twice { .. } => twice.push(said),
-            _ => other.push(said),
+            false => twice.push(said),
+            true => other.push(said),
         }
     }
     let list = |names: &[String]| if names.is_empty() { "none".to_string() } else { names.join(", ") };

@@ -9,7 +9,7 @@ use super::setup::setup;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;
 use crate::kernel;
-use crate::operator::table::{OPERATORS, Tensor};
+use crate::operator::table::{Fit, OPERATORS, Operator};
 use std::path::Path;
 
 /// The moments of an operator on particles.
@@ -64,6 +64,11 @@ fn h_facs(steps: u32) -> Vec<f64> {
     (0..=steps).map(|i| 0.8 + 1.2 * f64::from(i) / f64::from(steps)).collect()
 }
 
+/// Those whose weights are their own function of the distance and nothing more: all others have the weights of one of these.
+fn is_plain(operator: &&Operator) -> bool {
+    matches!(operator.fit, Fit::None) && !operator.joins_rows() && operator.is_one_matrix()
+}
+
 /// # Errors
 /// As [`Moments::of`].
 pub fn run(mut request: Request) -> Result<Page> {
@@ -73,8 +78,7 @@ pub fn run(mut request: Request) -> Result<Page> {
     let mut cases = Vec::new();
     for sample in &samples {
         for kernel in &kernels {
-            // The weights of the others are one of these.
-            for operator in OPERATORS.iter().filter(|o| matches!(o.tensor, Tensor::Scalar)) {
+            for operator in OPERATORS.iter().filter(is_plain) {
                 cases.extend(h_facs.iter().map(|h_fac| (sample, *kernel, operator.name, *h_fac)));
             }
         }

@@ -3,7 +3,7 @@
 use super::scene::Scene;
 use super::setup::setup;
 use crate::error::Result;
-use crate::operator::table::{OPERATORS, Tensor};
+use crate::operator::table::OPERATORS;
 use crate::operator::{Normalise, Operator};
 use crate::plan::applies::fitting;
 use crate::words::replaced;
@@ -109,7 +109,7 @@ impl Sample {
 /// Operators for a scalar conductivity that differ from each other there: those that only multiply a pair's weight by an
 /// angle are the same as without.
 pub fn isotropic() -> impl Iterator<Item = &'static Operator> {
-    OPERATORS.iter().filter(|o| !matches!(o.tensor, Tensor::Angular(_)))
+    OPERATORS.iter().filter(|o| !o.has_angle())
 }
 
 /// Each with and without what it can be normalised by: in words, and what it is called.
@@ -117,12 +117,11 @@ pub fn variants() -> Vec<(String, String)> {
     let of = |(name, normalise): (&str, &str)| {
         (format!("operator={name} normalise={normalise}"), format!("{name} {normalise}"))
     };
-    let pairs = isotropic().flat_map(|o| match (o.normalise, o.tensor) {
-        (Normalise::No, _) | (_, Tensor::Twice { .. } | Tensor::Projected | Tensor::Stencils) => {
-            vec![(o.name, o.normalise.name())]
-        }
-        _ => vec![(o.name, "none"), (o.name, "pair"), (o.name, "tensor")],
-    });
+    let pairs =
+        isotropic().flat_map(|o| match o.normalise == Normalise::No || o.is_projected() || !o.is_one_matrix() {
+            true => vec![(o.name, o.normalise.name())],
+            false => vec![(o.name, "none"), (o.name, "pair"), (o.name, "tensor")],
+        });
     pairs.map(of).collect()
 }
 

@@ -2,6 +2,7 @@
 //! independence of order, threads, place, orientation and units.
 
 use crate::particles::*;
+use diffusph::operator::table::{OPERATORS, find};
 use diffusph::{Solver, Strided};
 use std::f64::consts::PI;
 
@@ -16,9 +17,8 @@ fn for_all(mut visit: impl FnMut(&str, &str, &str, usize)) {
     for dim in 1..=3 {
         for kernel in names("kernels") {
             for operator in names("operators") {
-                // Consistent weights take none.
                 let all: &[&str] = if dim == 2 { &["tensor", "pair", "none"] } else { &["tensor", "none"] };
-                let by = if operator == "consistent" { &["none"][..] } else { all };
+                let by = if find(&operator).unwrap().is_exact() { &["none"][..] } else { all };
                 for normalise in by {
                     visit(&kernel, &operator, normalise, dim);
                 }
@@ -44,9 +44,13 @@ fn energy_is_exchanged_and_constants_are_kept() {
             let (sum, size) = rate.iter().fold((0.0, 0.0), |(sum, size), r| (sum + r, size + r.abs()));
             assert!(size > 0.0);
             // Exchanges cancel to the bit; what is left is the rounding of row sums of up to a thousand terms.
-            // Consistent weights are not symmetric, and do not conserve.
             let kept = (sum / size).abs() < 1e-13;
-            assert_eq!(kept, operator != "consistent", "{words} dim {dim} periodic {periodic}: {:e}", sum / size);
+            assert_eq!(
+                kept,
+                find(operator).unwrap().conserves,
+                "{words} dim {dim} periodic {periodic}: {:e}",
+                sum / size
+            );
         }
     });
 }
@@ -63,7 +67,7 @@ fn positive_operators_keep_the_maximum_principle_and_the_direct_one_does_not() {
             let smallest = s.get_number("smallest_weight").unwrap();
             (smallest, s.step(0.01), s.get_all("T").unwrap())
         };
-        for operator in ["brookshaw", "kernel"] {
+        for operator in OPERATORS.iter().filter(|o| o.positive && o.is_one_matrix()).map(|o| o.name) {
             let (smallest, report, t) = step(operator);
             assert!(smallest >= 0.0, "{kernel} {operator}: weight {smallest}");
             report.unwrap();
@@ -97,8 +101,8 @@ fn a_parabola_gives_the_second_moment() {
         let k = s.get_all("K_d2").unwrap()[centre];
         // Gradients that are exact for linear fields, and their adjoint, are right where the lattice is regular.
         // Those of all particles are found together, and reach the centre from the edges.
-        let exact = (normalise != "none" && !["projected", "monotone"].contains(&operator))
-            || ["two-first", "limited"].contains(&operator);
+        let operator = find(operator).unwrap();
+        let exact = (normalise != "none" && !operator.is_projected()) || !operator.is_one_matrix();
         let expected = if exact { 2.0 } else { 2.0 * k };
         // Terms of order 1/h² ~ n² cancel down to 2.
         assert!((rate - expected).abs() < 1e-10, "{words} dim {dim}: {rate} {expected}");
@@ -343,7 +347,7 @@ fn what_making_weights_takes_counts_too() {
         let mut s = unit_box(&format!("kernel=M4 operator={operator} memory=2e6"), &x, 3, true);
         s.set_number("T", 1.0).unwrap();
         let plan = s.plan().unwrap().to_string();
-        assert_eq!(plan.contains(" project "), operator == "projected", "{plan}");
+        assert_eq!(plan.contains(" join "), operator == "projected", "{plan}");
         s.step(1e-6).map(drop)
     };
     step("brookshaw").unwrap();

@@ -367,7 +367,7 @@ fn a_step_that_fails_leaves_the_plan_as_it_was_and_a_file_without_particles_chan
     // What the failed step asked memory for may still be held.
     let plan = |s: &mut Solver| {
         let plan = s.plan().unwrap();
-        let passes: Vec<_> = plan.passes.iter().map(|p| (p.name, p.about.clone(), p.when)).collect();
+        let passes: Vec<_> = plan.passes.iter().map(|p| (p.pass.name, p.about.clone(), p.when)).collect();
         (plan.title.clone(), passes, plan.left_out.clone())
     };
     let before = plan(&mut s);

@@ -5,7 +5,7 @@ use diffusph::kernel::Kernel;
 use diffusph::model::fields;
 use diffusph::model::heat::{Conductivity, Release};
 use diffusph::operator::Normalise;
-use diffusph::operator::table::{OPERATORS, Operator, Tensor};
+use diffusph::operator::table::{Fit, OPERATORS, Operator, PAIRS};
 use diffusph::plan::given::Offer;
 use diffusph::plan::input::Input;
 use diffusph::plan::rules::{self, RULES, Rule, Same};
@@ -169,6 +169,25 @@ fn every_rule_has_a_scene_and_changes_nothing_but_the_work() {
     }
 }
 
+/// What has run is what the plan lists, and what the plan has made has run.
+#[test]
+fn the_plan_is_the_program() {
+    for scene in SCENES {
+        for without in ["".into(), format!(" without={}", scene.rule.name)] {
+            let mut s = run(scene, &without).solver;
+            let (plan, case) = (s.plan().unwrap(), format!("{}{without}", scene.words));
+            let listed = |name: &str| plan.passes.iter().any(|line| line.pass.name == name);
+            for (name, _) in s.spent().0 {
+                assert!(listed(name), "{case}: {name} has run\n{plan}");
+            }
+            let stored = !plan.leaves_out(&rules::USED_ONCE);
+            for pass in plan.passes.iter().map(|line| line.pass).filter(|pass| pass.make.is_some() && stored) {
+                assert!(s.runs(pass.name) > 0, "{case}: {} has not run\n{plan}", pass.name);
+            }
+        }
+    }
+}
+
 /// Evaluations of [`COUNTED`]'s weights and angular factors.
 static ROWS: AtomicU64 = AtomicU64::new(0);
 static ANGLES: AtomicU64 = AtomicU64::new(0);
@@ -177,9 +196,11 @@ static COUNTED: Operator = Operator {
     name: "counted",
     about: "Brookshaw's weights, counted",
     positive: true,
-    normalise: Normalise::Pair,
     dissipative: true,
-    tensor: Tensor::Angular(|along, nu| {
+    conserves: true,
+    takes_tensors: true,
+    normalise: Normalise::Pair,
+    fit: Fit::Angle(|along, nu| {
         ANGLES.fetch_add(1, Ordering::Relaxed);
         0.5 * ((nu + 2.0) * along - nu)
     }),
@@ -187,6 +208,7 @@ static COUNTED: Operator = Operator {
         ROWS.fetch_add(q.len() as u64, Ordering::Relaxed);
         (OPERATORS[0].weight)(kernel, q, w, spare);
     },
+    ..PAIRS
 };
 
 /// Particles as the scenes have them, prepared, of one kappa for all or one for each.

@@ -18,8 +18,8 @@
 
 mod limit;
 
+use super::assembly::Assembly;
 use super::matrix::Matrix;
-use super::once::Assembly;
 use super::tensor::{self, Sym, dot};
 use super::{Mean, gradient};
 use crate::error::Result;

@@ -61,8 +61,8 @@ pub fn has_tensor(scene: &Scene) -> bool {
 /// Those that can take the scene's conductivity; of a number, a quick study leaves out those that are made for tensors.
 fn operators(scene: &Scene, full: bool) -> Vec<&'static Operator> {
     match has_tensor(scene) {
-        true => OPERATORS.iter().filter(|o| o.takes_tensors()).collect(),
-        false => isotropic().filter(|o| full || !o.takes_tensors()).collect(),
+        true => OPERATORS.iter().filter(|o| o.takes_tensors).collect(),
+        false => isotropic().filter(|o| full || !o.takes_tensors).collect(),
     }
 }
 
