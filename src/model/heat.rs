@@ -7,7 +7,7 @@ use super::surface::Surface;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::operator::aggregate::{self, Couplings};
-use crate::operator::{Mean, Multigrid, Pairs};
+use crate::operator::{Engine, Mean, Medium, Multigrid};
 use crate::pool::Pool;
 use crate::sum;
 
@@ -45,7 +45,7 @@ pub enum Release<'a> {
 /// The right-hand side, with everything that the scene needs and nothing else.
 pub struct Heat<'a> {
     pub pool: &'a Pool,
-    pub pairs: Pairs<'a>,
+    pub engine: Engine<'a>,
     pub mean: Mean,
     /// 1/(m c_v), 0 where T is fixed.
     pub inverse_capacity: &'a [f64],
@@ -86,7 +86,6 @@ impl Heat<'_> {
     /// # Errors
     /// `Cancelled`; `CallbackFailed` with the host's code; `BadElement` when a callback gives a negative or non-finite kappa.
     pub fn rate(&mut self, time: f64, t: &[f64], rate: &mut [f64]) -> Result<()> {
-        self.pool.go_on()?;
         self.applications += 1;
         self.kappa_of_t(time, t)?;
         self.diffuse(t, rate)?;
@@ -160,11 +159,9 @@ impl Heat<'_> {
     /// `NoMemory`; `OutOfOrder` without stored weights.
     pub fn parts(&mut self) -> Result<&[u32]> {
         if self.parts.is_none() {
-            let (Pairs::Stored(matrix) | Pairs::Twice(_, matrix)) = self.pairs else {
-                return Err(Error::OutOfOrder { call: "parts".into(), missing: "stored weights".into() });
-            };
-            let kappa = self.pair_kappa().filter(|_| self.operator_is_fixed());
-            *self.parts = Some(aggregate::parts(&Couplings { matrix, kappa, factor: self.factor() })?);
+            let (matrix, medium) = (self.engine.matrix()?, self.medium());
+            let kappa = medium.kappa().filter(|_| self.operator_is_fixed());
+            *self.parts = Some(aggregate::parts(&Couplings { matrix, kappa, factor: medium.factor })?);
         }
         Ok(self.parts.as_deref().unwrap_or(&[]))
     }
@@ -179,7 +176,6 @@ impl Heat<'_> {
     /// # Errors
     /// `Cancelled`; `NoMemory`.
     pub fn linear(&mut self, x: &[f64], out: &mut [f64]) -> Result<()> {
-        self.pool.go_on()?;
         self.applications += 1;
         self.diffuse(x, out)?;
         let slopes = &self.slopes;
@@ -196,8 +192,7 @@ impl Heat<'_> {
 
     /// Whether the operator is a linear one that stays the same while T changes.
     pub fn has_spectrum(&self) -> bool {
-        let limited = matches!(self.pairs, Pairs::Twice(twice, _) if twice.is_limited());
-        !limited && self.operator_is_fixed()
+        self.engine.is_linear() && self.operator_is_fixed()
     }
 
     /// Whether the operator stays the same while T changes.
@@ -241,30 +236,13 @@ impl Heat<'_> {
 
     /// The diffusive part of dT/dt alone, with the conductivity evaluated last.
     pub fn diffuse(&self, t: &[f64], rate: &mut [f64]) -> Result<()> {
-        let (inverse, factor, kappa) = (self.inverse_capacity, self.factor(), self.pair_kappa());
-        let finish = |i: usize, sum: f64| sum * factor * inverse[i];
-        match self.pairs {
-            Pairs::Fresh(assembly) => assembly.apply(self.pool, kappa, t, rate, finish)?,
-            Pairs::Stored(matrix) => matrix.apply(self.pool, kappa, t, rate, self.quiet, finish),
-            Pairs::Twice(twice, matrix) => twice.apply(matrix, self.pool, kappa, t, rate, finish)?,
-        }
-        Ok(())
+        self.engine.apply(self.pool, &self.medium(), t, rate)
     }
 
     /// For each particle the radius and the centre's size of its Gershgorin circle, in 1/s. Needs stored weights.
     pub fn circles(&mut self, time: f64, t: &[f64]) -> Result<Vec<(f64, f64)>> {
         self.kappa_of_t(time, t)?;
-        let mut circles = match self.pairs {
-            Pairs::Stored(matrix) => matrix.circles(self.pool, self.pair_kappa())?,
-            Pairs::Twice(twice, matrix) => twice.circles(matrix, self.pool, self.pair_kappa())?,
-            Pairs::Fresh(_) => {
-                return Err(Error::OutOfOrder { call: "a bound".into(), missing: "stored weights".into() });
-            }
-        };
-        for ((radius, centre), inverse) in circles.iter_mut().zip(self.inverse_capacity) {
-            let scale = self.factor() * inverse;
-            (*radius, *centre) = (*radius * scale, *centre * scale);
-        }
+        let mut circles = self.engine.circles(self.pool, &self.medium())?;
         if let Some(surface) = self.surface {
             let inverse = self.inverse_capacity;
             surface.slopes(self.evaluated_kappa(), t, |i, slope| circles[i].1 += slope * inverse[i]);
@@ -280,17 +258,15 @@ impl Heat<'_> {
         }
     }
 
-    /// What all pair sums are multiplied by.
-    pub(super) fn factor(&self) -> f64 {
-        if let Conductivity::Number(kappa) = self.conductivity { kappa } else { 1.0 }
-    }
-
-    pub(super) fn pair_kappa(&self) -> Option<(Mean, &[f64])> {
-        match &self.conductivity {
-            Conductivity::Number(_) | Conductivity::Folded => None,
-            Conductivity::Field(kappa) => Some((self.mean, kappa)),
-            Conductivity::Law(_, kappa) | Conductivity::Host(_, kappa) => Some((self.mean, kappa)),
-        }
+    /// What lies between particles, with the conductivity evaluated last.
+    pub(super) fn medium(&self) -> Medium<'_> {
+        let (factor, kappa) = match &self.conductivity {
+            Conductivity::Number(kappa) => (*kappa, None),
+            Conductivity::Folded => (1.0, None),
+            Conductivity::Field(kappa) => (1.0, Some(*kappa)),
+            Conductivity::Law(_, kappa) | Conductivity::Host(_, kappa) => (1.0, Some(&**kappa)),
+        };
+        Medium { mean: self.mean, kappa, factor, scale: self.inverse_capacity, quiet: self.quiet }
     }
 
     /// Evaluates kappa(T), where there is such a thing, for the pair sums to come; empty where there is not.

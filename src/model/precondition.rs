@@ -2,7 +2,7 @@
 
 use super::heat::Heat;
 use crate::error::Result;
-use crate::operator::Pairs;
+use crate::operator::Engine;
 use crate::operator::aggregate::Couplings;
 use crate::operator::multigrid::{Fine, Multigrid};
 use crate::sum;
@@ -36,7 +36,7 @@ impl Heat<'_> {
         fine: Fine,
         work: impl FnOnce(&mut Self, &mut Multigrid) -> Result<()>,
     ) -> Result<bool> {
-        let Pairs::Stored(matrix) = self.pairs else { return Ok(false) };
+        let Engine::Stored(matrix) = self.engine else { return Ok(false) };
         if self.stiff.is_infinite() {
             return Ok(false);
         }
@@ -44,7 +44,8 @@ impl Heat<'_> {
         let length = 0.5 * fine.g * sum::max(self.pool, fine.diagonal.len(), |i| fine.diagonal[i]);
         let Some(multigrid) = self.multigrid.take_if(|_| length >= self.stiff) else { return Ok(false) };
         if multigrid.is_empty() {
-            let couplings = Couplings { matrix, kappa: self.pair_kappa(), factor: self.factor() };
+            let medium = self.medium();
+            let couplings = Couplings { matrix, kappa: medium.kappa(), factor: medium.factor };
             *multigrid = Multigrid::build(fine, &couplings)?;
         }
         work(self, multigrid)?;

@@ -1,6 +1,6 @@
 //! Aggregates of strongly coupled points: the unknowns of the next coarser level (Vaněk, Mandel & Brezina 1996).
 
-use super::{Matrix, Mean};
+use super::{Kappa, Matrix};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
@@ -26,7 +26,7 @@ pub trait Graph: Sync {
 /// Particles, coupled by factor g_ab mean(kappa_a, kappa_b).
 pub struct Couplings<'a> {
     pub matrix: &'a Matrix,
-    pub kappa: Option<(Mean, &'a [f64])>,
+    pub kappa: Kappa<'a>,
     pub factor: f64,
 }
 

@@ -2,7 +2,7 @@
 //! a pair: shorter columns (16 bits, named through a table of blocks) were measured to cost more in decoding than they
 //! save in reading.
 
-use super::Mean;
+use super::{Kappa, Mean};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
@@ -191,7 +191,7 @@ impl Matrix {
     pub fn apply(
         &self,
         pool: &Pool,
-        kappa: Option<(Mean, &[f64])>,
+        kappa: Kappa,
         t: &[f64],
         out: &mut [f64],
         quiet: bool,
@@ -219,7 +219,7 @@ impl Matrix {
     }
 
     /// Σ_b |g_ab| mean(k_a, k_b) of each row, and |Σ_b g_ab mean(k_a, k_b)| beside it: what Gershgorin's circles are made of.
-    pub fn circles(&self, pool: &Pool, kappa: Option<(Mean, &[f64])>) -> Result<Vec<(f64, f64)>> {
+    pub fn circles(&self, pool: &Pool, kappa: Kappa) -> Result<Vec<(f64, f64)>> {
         let mut out = memory::filled("row sums", self.n, (0.0, 0.0))?;
         pool.chunks(&mut out, BLOCK, |start, part| {
             let block = &self.blocks[start / BLOCK];

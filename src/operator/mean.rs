@@ -59,6 +59,9 @@ fn harmonic(a: f64, b: f64) -> f64 {
     2.0 * low * (high / (low + high).max(f64::MIN_POSITIVE))
 }
 
+/// An average, and the conductivity of each particle; none where it is one for all, or in the coefficients already.
+pub type Kappa<'a> = Option<(Mean, &'a [f64])>;
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -8,8 +8,7 @@ use super::assembly::{self, Assembly};
 use super::matrix::{Block, Matrix, Seen, row_sum};
 use super::normalise::{self, Normalise, Normals};
 use super::table::{self, Fit, Join};
-use super::twice::Twice;
-use super::{Mean, apart, consistent, moments, projected, stencils};
+use super::{Kappa, apart, consistent, moments, projected, stencils};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
@@ -201,7 +200,7 @@ impl Assembly<'_> {
     pub fn apply(
         &self,
         pool: &Pool,
-        kappa: Option<(Mean, &[f64])>,
+        kappa: Kappa,
         t: &[f64],
         out: &mut [f64],
         finish: impl Fn(usize, f64) -> f64 + Sync + Send,
@@ -262,13 +261,4 @@ struct Workspace {
     seen: Seen,
     /// Room for the pairs of a block.
     pairs: usize,
-}
-
-/// Pair sums, from stored weights or from weights made on the way.
-#[derive(Clone, Copy)]
-pub enum Pairs<'a> {
-    Stored(&'a Matrix),
-    Fresh(&'a Assembly<'a>),
-    /// Two sweeps, over the pairs of a matrix.
-    Twice(&'a Twice, &'a Matrix),
 }

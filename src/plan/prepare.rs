@@ -15,7 +15,7 @@ use crate::operator::normalise::Normals;
 use crate::operator::table::{self, Fit, OPERATORS, Sweeps};
 use crate::operator::twice::Recipe;
 use crate::operator::walls::Walls;
-use crate::operator::{Assembly, Matrix, Multigrid, Pairs, Sym, Twice, bypass, tensor};
+use crate::operator::{Assembly, Engine, Matrix, Multigrid, Sym, Twice, bypass, tensor};
 use crate::space::{density, rows::Rows};
 use std::borrow::Cow;
 
@@ -573,19 +573,19 @@ impl State {
             None => Release::Field(&source),
         };
         let (rows, assembly);
-        let pairs = match &self.weights {
-            Some(Weights { matrix, twice: Some(twice), .. }) => Pairs::Twice(twice, matrix),
-            Some(weights) => Pairs::Stored(&weights.matrix),
+        let engine = match &self.weights {
+            Some(Weights { matrix, twice: Some(twice), .. }) => Engine::Twice(twice, matrix),
+            Some(weights) => Engine::Stored(&weights.matrix),
             None => {
                 rows = Rows::new(cloud, &g.h, self.choices.kernel.radius(), &self.pool)?;
                 let (same_h, shape) = (plan.leaves_out(&rules::SAME_H), shape_of(&self.directions, &units));
                 assembly = assembly_of(&self.choices, &rows, &g.volume, same_h, shape);
-                Pairs::Fresh(&assembly)
+                Engine::Fresh(&assembly)
             }
         };
         let mut heat = Heat {
             pool: &self.pool,
-            pairs,
+            engine,
             mean,
             inverse_capacity,
             conductivity,

@@ -4,10 +4,10 @@
 //! A particle may gain from corrections at most Q⁺ = Σ q_ab (T_b − T_a)⁺ and lose at most Q⁻, so a local maximum gains
 //! nothing. A pair takes the smaller share of both ends, with opposite signs: energy is kept to rounding.
 
-use super::{Exchange, Kappa, Twice};
+use super::{Exchange, Twice};
 use crate::error::Result;
 use crate::memory;
-use crate::operator::Matrix;
+use crate::operator::{Kappa, Matrix};
 use crate::pool::Pool;
 
 /// q_ab in units of the isotropic weights. On 2-D glass and jitter, kappa_perp = 0, 1 clipped smooth extrema (error

@@ -21,7 +21,7 @@ mod limit;
 use super::assembly::Assembly;
 use super::matrix::Matrix;
 use super::tensor::{self, Sym, dot};
-use super::{Mean, gradient};
+use super::{Kappa, gradient};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
@@ -76,8 +76,6 @@ struct Exchange {
     low: f64,
     mean_kappa: f64,
 }
-
-type Kappa<'a> = Option<(Mean, &'a [f64])>;
 
 impl Twice {
     /// # Errors
