@@ -5,7 +5,7 @@
 //! | floor | rooms |
 //! |---|---|
 //! | doors | [`ffi`], `cli` |
-//! | users | [`study`] |
+//! | users | `study` |
 //! | handle | [`solver`], [`io`] |
 //! | plan | [`plan`] |
 //! | motion | [`integrator`], [`model`] |
@@ -38,6 +38,7 @@ pub mod solver;
 
 pub mod io;
 
+#[cfg(feature = "cli")]
 pub mod study;
 
 #[cfg(feature = "cli")]

@@ -5,7 +5,7 @@ use super::guard::{Handle, Inside, with};
 use super::pointers::{copy_out, place, room, strided_mut};
 use super::report::{Place, Report};
 use crate::error::{Error, Result};
-use crate::study::recommend;
+use crate::solver::recommend;
 use std::ffi::c_char;
 
 /// Advances by exactly dt, in as many sub-steps as the method needs. Whatever goes wrong, the solver is as it was before.

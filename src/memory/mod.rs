@@ -2,6 +2,8 @@
 //! with it.
 
 mod limits;
+// Without the feature all that is asked is whether it is low, and it never is.
+#[cfg_attr(not(feature = "reserve"), allow(dead_code))]
 mod reserve;
 
 use crate::error::{Error, Result};

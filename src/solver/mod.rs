@@ -8,6 +8,7 @@
 //! | `files` | particles from and to VTK files |
 //! | `restart` | what a snapshot holds so that a run goes on from it |
 //! | `frame` | how a plane or a line lies in a file |
+//! | `recommend` | what reaches an error cheapest on the particles that a host has |
 //! | `trial` | the same particles with other words |
 //! | `catalogue` | what can be chosen, by name |
 
@@ -15,6 +16,7 @@ pub mod catalogue;
 mod files;
 pub mod frame;
 mod query;
+pub mod recommend;
 mod restart;
 pub mod trial;
 

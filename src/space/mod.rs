@@ -12,6 +12,7 @@ pub mod morton;
 mod nearest;
 pub mod rows;
 mod scratch;
+pub mod surface;
 
 pub use cloud::Cloud;
 pub use domain::{Domain, LENGTHS, LENGTHS_RULE};

@@ -8,13 +8,13 @@ use super::kernels::Moments;
 use super::mode::{CUBIC, FCC, GLASS_2D, GLASS_3D, HEXAGONAL, JITTER_2D, JITTER_3D, SQUARE, Sample};
 use super::page::Page;
 use super::positivity::{Growth, limit};
-use super::recommend::refused;
 use super::run::Study;
 use super::scene::{Exact, Numbers, Value};
 use super::sod::{EQUAL, Shock, correlations, tubes};
 use super::table::{Table, column, short};
 use crate::error::Result;
 use crate::operator::table::OPERATORS;
+use crate::solver::recommend::refused;
 use std::path::Path;
 
 /// Checks a sentence: says the answer, adds its numbers.

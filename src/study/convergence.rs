@@ -5,10 +5,10 @@ use super::catalogue::Request;
 use super::mode::{CUBIC, FCC, GLASS_2D, GLASS_3D, HEXAGONAL, JITTER_2D, JITTER_3D, SQUARE, Sample, variants};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
-use super::recommend::refused;
 use super::run::Study;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;
+use crate::solver::recommend::refused;
 use std::path::Path;
 
 #[derive(Debug, Clone)]

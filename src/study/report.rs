@@ -1,7 +1,7 @@
 //! What a run found and what it took: accuracy against run time. One struct, as text for people, as JSON for programs.
 
-use super::norm::l2;
 use crate::plan::{self, readable};
+use crate::sum::l2;
 use serde::Serialize;
 use std::fmt;
 

@@ -2,13 +2,14 @@
 
 use super::exact::{self, Exact};
 use super::scene::{Numbers, Particles, Periodic, Scene, Value, Where};
-use super::{choose, glass, lattice, surface};
+use super::{choose, glass, lattice};
 use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::io::{self, Snapshot};
 use crate::model::conductivity::LAWS;
 use crate::model::fields::{self, NUMBERS};
 use crate::solver::Solver;
+use crate::space::surface;
 use std::collections::BTreeMap;
 use std::path::Path;
 

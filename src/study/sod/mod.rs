@@ -9,10 +9,10 @@ use super::kernels::Moments;
 use super::mode::{FCC, LINE, Sample};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
-use super::recommend::refused;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;
 use crate::kernel;
+use crate::solver::recommend::refused;
 use riemann::{Gas, Riemann};
 use tube::Tube;
 

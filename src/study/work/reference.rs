@@ -5,11 +5,11 @@
 use super::choices::{Choice, has_tensor};
 use crate::error::{Error, Result};
 use crate::plan::applies::fitting;
-use crate::study::norm::l2;
-use crate::study::recommend;
+use crate::solver::recommend;
 use crate::study::run::{Field, Known, Study};
 use crate::study::scene::Scene;
 use crate::study::setup::setup;
+use crate::sum::l2;
 use crate::words::replaced;
 use std::cell::RefCell;
 use std::collections::HashMap;

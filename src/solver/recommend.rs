@@ -10,14 +10,14 @@
 //! operator, and its error what conservative operators of other forms and supports differ from it by, a longer support
 //! counted by Richardson as of a method of first order.
 
-use super::norm::l2;
-use super::surface;
+use super::Solver;
+use super::trial::Trial;
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::operator::table;
 use crate::plan::applies::fitting;
-use crate::solver::Solver;
-use crate::solver::trial::Trial;
+use crate::space::surface;
+use crate::sum::l2;
 use crate::words::replaced;
 use std::f64::consts::PI;
 use std::time::Duration;
@@ -251,11 +251,11 @@ fn pairs(t: &[f64], known: &[f64], free: &[bool]) -> Vec<(f64, f64)> {
     t.iter().zip(known).zip(free).filter(|(_, free)| **free).map(|((t, known), _)| (*t, *known)).collect()
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cli"))]
 mod tests {
-    use super::super::lattice;
     use super::*;
     use crate::array::Strided;
+    use crate::study::lattice;
 
     /// A mode on jittered particles of the unit square, and the time in which it decays to 1/e.
     fn mode(n: usize, words: &str) -> (Solver, Vec<f64>, f64) {

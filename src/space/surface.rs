@@ -5,12 +5,12 @@
 //! pairs count no more than others. (The operator's first moment, whose weights grow for close pairs, does not tell a
 //! strongly disordered interior from a surface.)
 
+use super::rows::Rows;
+use super::{Cloud, Domain, ONE_SIDED, Row, Scratch};
 use crate::array::Strided;
 use crate::error::Result;
 use crate::memory;
 use crate::pool::Pool;
-use crate::space::rows::Rows;
-use crate::space::{Cloud, Domain, ONE_SIDED, Row, Scratch};
 
 /// Reach of the search, in spacings: between two shells of a lattice.
 const REACH: f64 = 2.9;
@@ -60,10 +60,10 @@ fn near(domain: &Domain, x: &[f64], spacing: &[f64], mut visit: impl FnMut(&Row,
     })
 }
 
-#[cfg(test)]
+#[cfg(all(test, feature = "cli"))]
 mod tests {
-    use super::super::lattice::{find, jitter};
     use super::*;
+    use crate::study::lattice::{find, jitter};
 
     #[test]
     fn a_disordered_block_has_its_outermost_layer_as_surface() {
