@@ -3,7 +3,8 @@
 use super::{interrupt, print, progress};
 use crate::error::{Error, Result};
 use crate::io::atomic;
-use crate::study::catalogue::{self, Answer, Request};
+use crate::study::catalogue;
+use crate::study::request::{Answer, Request};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;

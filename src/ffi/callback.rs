@@ -2,8 +2,9 @@
 
 use super::environment::restore_default;
 use super::guard::{Handle, with};
+use super::log::{Log, User};
 use crate::model::heat;
-use std::ffi::{CString, c_char, c_void};
+use std::ffi::{c_char, c_void};
 
 /// Fills `out` for the temperatures `T`: kappa in W/(m K), or heat released per volume in W/m^3. The arrays are in the
 /// solver's order; `particle[k]` is the host's number (from 0) of the k-th value. An answer other than 0 makes the call
@@ -26,36 +27,6 @@ pub type ProgressCallback = Option<unsafe extern "C-unwind" fn(user: *mut c_void
 
 /// Told what happens, at a level DIFFUSPH_LOG_*. The text lives until the callback returns.
 pub type LogCallback = Option<unsafe extern "C-unwind" fn(user: *mut c_void, level: i32, text: *const c_char)>;
-
-/// The host's pointer, handed back to its own functions and not touched otherwise.
-#[derive(Clone, Copy)]
-struct User(*mut c_void);
-
-// SAFETY: the host may call from any thread, so its functions must accept its pointer on any.
-unsafe impl Send for User {}
-
-impl User {
-    fn get(self) -> *mut c_void {
-        self.0
-    }
-}
-
-/// A host's log function with its pointer.
-pub struct Log {
-    function: unsafe extern "C-unwind" fn(*mut c_void, i32, *const c_char),
-    user: User,
-}
-
-impl Log {
-    pub fn tell(&self, level: i32, text: &str) {
-        // A damaged file's name for something may contain any character.
-        if let Ok(text) = CString::new(text.replace('\0', " ")) {
-            // SAFETY: the host's word.
-            unsafe { (self.function)(self.user.get(), level, text.as_ptr()) };
-            restore_default();
-        }
-    }
-}
 
 fn field(callback: FieldCallback, user: *mut c_void) -> Option<heat::Callback> {
     let (function, user) = (callback?, User(user));

@@ -1,9 +1,9 @@
 //! The one door that every call goes through. It refuses NULL, a handle in use, a forked process and a broken solver; it
 //! puts the host's floating-point environment aside; and it turns a panic into a code, silently.
 
-use super::callback::Log;
 use super::codes::{DIFFUSPH_LOG_ERROR, DIFFUSPH_LOG_WARNING};
 use super::environment::Environment;
+use super::log::Log;
 use crate::error::{Error, Result};
 use crate::solver::Solver;
 use std::any::Any;

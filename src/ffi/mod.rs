@@ -10,6 +10,7 @@
 //! | `report` | what a step did, as a C struct |
 //! | `lifetime` | create, destroy, message |
 //! | `set`, `callback` | what a host sets, and functions that it lends |
+//! | `log` | what it is told |
 //! | `advance` | step, limit, rate, cancel, plan |
 //! | `get` | what a host gets |
 //! | `files` | VTK files |
@@ -28,6 +29,7 @@ mod files;
 mod get;
 mod guard;
 mod lifetime;
+mod log;
 mod pointers;
 mod report;
 mod set;

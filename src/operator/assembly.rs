@@ -1,8 +1,7 @@
 //! What a row of weights is made from: an operator's function of the distance on a row of neighbours, symmetrised and
 //! turned. What such rows are fitted to, and how all of them become a matrix, is in [`super::once`].
 
-use super::normalise::Normalise;
-use super::table::{Fit, Operator};
+use super::table::{Fit, Normalise, Operator};
 use super::tensor::{self, Sym};
 use crate::error::Result;
 use crate::kernel::Kernel;

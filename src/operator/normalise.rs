@@ -15,50 +15,17 @@
 //! A direction in which a particle has no neighbours cannot conduct, and asking for it would spoil the others: asked for
 //! are those that are there ([`Asked`]).
 
+use super::Matrix;
 use super::assembly::Assembly;
+use super::table::Normalise;
 use super::tensor::{self, AXES, Sym};
-use super::{Matrix, moments};
 use crate::error::Result;
 use crate::memory;
 use crate::pool::Pool;
 use crate::space::Row;
+use crate::sum;
 use nalgebra::{Matrix3, Matrix6, Vector6};
 use std::f64::consts::SQRT_2;
-
-/// How weights of pairs are scaled.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Normalise {
-    No,
-    Pair,
-    Tensor,
-}
-
-pub static NORMALISATIONS: &[(&str, Normalise)] =
-    &[("tensor", Normalise::Tensor), ("pair", Normalise::Pair), ("none", Normalise::No)];
-
-impl Normalise {
-    pub fn name(self) -> &'static str {
-        NORMALISATIONS.iter().find(|(_, n)| *n == self).map_or("", |(name, _)| name)
-    }
-
-    /// What the pass does.
-    pub fn about(self) -> &'static str {
-        match self {
-            Normalise::No => "",
-            Normalise::Pair => "pairs scaled by the mean of 1/K_a and 1/K_b",
-            Normalise::Tensor => "pairs scaled so that each particle conducts alike in all directions that it has",
-        }
-    }
-
-    /// Bytes for each particle that it takes while it lasts.
-    pub fn bytes(self, dim: usize) -> f64 {
-        match self {
-            Normalise::No => 0.0,
-            Normalise::Tensor if dim > 1 => (size_of::<Sym>() + 8 * (dim + dim * (dim + 1) / 2)) as f64,
-            _ => 8.0,
-        }
-    }
-}
 
 /// K_a below which a particle counts as having too few neighbours for its weights to be normalised: scaling them up
 /// by more than this would make a lone pair as stiff as it is meaningless.
@@ -77,7 +44,7 @@ pub struct Normals {
     pub tensors: Vec<Sym>,
     /// Rows of consistent weights that take normalised pairs instead; empty for other operators.
     pub paired: Vec<bool>,
-    /// Of projected weights, the root mean square of [`moments::conduction`].
+    /// Of projected weights, the root mean square of [`super::moments::conduction`].
     pub defect: Option<f64>,
 }
 
@@ -195,7 +162,7 @@ pub fn tensor_of(assembly: &Assembly, row: &Row, g: &[f64]) -> Sym {
     let shape = assembly.shape.filter(|_| assembly.operator.turns_weights()).map(|shape| &shape[row.i]);
     let scale = 0.5 / assembly.volume[row.i];
     match assembly.kernel.dim() {
-        1 => [1.0 / (scale * moments::of_row(g, row.r)).max(LEAST_MOMENT), 0.0, 0.0, 0.0, 0.0, 0.0],
+        1 => [1.0 / (scale * sum::product(g, row.r, row.r)).max(LEAST_MOMENT), 0.0, 0.0, 0.0, 0.0, 0.0],
         2 => Conditions::<2, 3>::of(scale, row, g).solve(shape),
         _ => Conditions::<3, 6>::of(scale, row, g).solve(shape),
     }

@@ -6,8 +6,8 @@
 
 use super::assembly::{self, Assembly};
 use super::matrix::{Block, Matrix, Seen, row_sum};
-use super::normalise::{self, Normalise, Normals};
-use super::table::{self, Fit, Join};
+use super::normalise::{self, Normals};
+use super::table::{self, Fit, Join, Normalise};
 use super::{Kappa, apart, consistent, moments, projected, stencils};
 use crate::error::Result;
 use crate::memory;

@@ -1,6 +1,5 @@
 //! Every operator, a row each. Add an operator here.
 
-use super::{Normalise, projected, twice};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 
@@ -49,6 +48,32 @@ pub enum Join {
     Projection,
 }
 
+/// How weights of pairs are scaled.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Normalise {
+    No,
+    Pair,
+    Tensor,
+}
+
+pub static NORMALISATIONS: &[(&str, Normalise)] =
+    &[("tensor", Normalise::Tensor), ("pair", Normalise::Pair), ("none", Normalise::No)];
+
+impl Normalise {
+    pub fn name(self) -> &'static str {
+        NORMALISATIONS.iter().find(|(_, n)| *n == self).map_or("", |(name, _)| name)
+    }
+
+    /// What the pass does.
+    pub fn about(self) -> &'static str {
+        match self {
+            Normalise::No => "",
+            Normalise::Pair => "pairs scaled by the mean of 1/K_a and 1/K_b",
+            Normalise::Tensor => "pairs scaled so that each particle conducts alike in all directions that it has",
+        }
+    }
+}
+
 /// How often a rate goes over the pairs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Sweeps {
@@ -73,9 +98,6 @@ pub const PAIRS: Operator = Operator {
     sweeps: Sweeps::One,
     weight: brookshaw,
 };
-
-/// Bytes of a stored matrix for each pair and for each particle: a column and a coefficient; a second moment.
-const MATRIX: [f64; 2] = [12.0, 8.0];
 
 /// Brookshaw's weight, -2 F/r.
 fn brookshaw(kernel: &Kernel, q: &[f64], w: &mut [f64], _: &mut [f64]) {
@@ -253,36 +275,6 @@ impl Operator {
             _ => Some(1),
         }
     }
-
-    /// Bytes that all that is stored takes, for each pair and for each particle.
-    pub fn bytes(&self) -> [f64; 2] {
-        sum([self.bytes_of_pairs(), self.bytes_of_sweeps()])
-    }
-
-    /// The part of it that are weights of pairs.
-    pub fn bytes_of_pairs(&self) -> [f64; 2] {
-        MATRIX
-    }
-
-    /// The part that two sweeps take beside them.
-    pub fn bytes_of_sweeps(&self) -> [f64; 2] {
-        match self.sweeps {
-            Sweeps::One => [0.0; 2],
-            Sweeps::Two { limited: false } => twice::BYTES,
-            // The limit is another matrix.
-            Sweeps::Two { limited: true } => sum([twice::BYTES, MATRIX]),
-        }
-    }
-
-    /// Bytes that projecting weights takes beside them while it lasts, where the operator does that.
-    pub fn bytes_to_project(&self, dim: usize) -> [f64; 2] {
-        let projects = self.is_projected() || self.sweeps == Sweeps::Two { limited: true };
-        if projects { projected::bytes(dim) } else { [0.0; 2] }
-    }
-}
-
-fn sum<const N: usize>(parts: [[f64; 2]; N]) -> [f64; 2] {
-    [0, 1].map(|k| parts.iter().map(|part| part[k]).sum())
 }
 
 /// The operator of this name, whatever its case.

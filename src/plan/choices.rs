@@ -8,8 +8,7 @@ use crate::error::{Error, Result};
 use crate::integrator::{self, Method, Options};
 use crate::kernel::Kernel;
 use crate::model::MODELS;
-use crate::operator::normalise::NORMALISATIONS;
-use crate::operator::table;
+use crate::operator::table::{self, NORMALISATIONS};
 use crate::operator::{Mean, Normalise, Operator};
 use crate::words::{Words, choice};
 

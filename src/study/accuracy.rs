@@ -1,10 +1,10 @@
 //! The figures of "How right": errors of a decaying mode for the choices that matter, medians over seeds of the disorder.
 
 use super::batch;
-use super::catalogue::Request;
 use super::convergence::Run;
 use super::mode::{CUBIC, Cloud, FCC, GLASS_3D, JITTER_2D, JITTER_3D, SQUARE, STRONG_2D, STRONG_3D, Sample};
 use super::page::Page;
+use super::request::Request;
 use super::table::{Table, column};
 use crate::error::Result;
 

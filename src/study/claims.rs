@@ -2,12 +2,12 @@
 
 use super::accuracy::spread;
 use super::batch;
-use super::catalogue::Request;
 use super::convergence::Run;
 use super::kernels::Moments;
 use super::mode::{CUBIC, FCC, GLASS_2D, GLASS_3D, HEXAGONAL, JITTER_2D, JITTER_3D, SQUARE, Sample};
 use super::page::Page;
 use super::positivity::{Growth, limit};
+use super::request::Request;
 use super::run::Study;
 use super::scene::{Exact, Numbers, Value};
 use super::sod::{EQUAL, Shock, correlations, tubes};

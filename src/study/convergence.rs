@@ -1,10 +1,10 @@
 //! Error of a decaying mode against resolution: every operator, on lattices and on disordered particles.
 
 use super::batch;
-use super::catalogue::Request;
 use super::mode::{CUBIC, FCC, GLASS_2D, GLASS_3D, HEXAGONAL, JITTER_2D, JITTER_3D, SQUARE, Sample, variants};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
+use super::request::Request;
 use super::run::Study;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;

@@ -1,10 +1,10 @@
 //! Second and first moment of every operator against h_fac: how good a Laplacian each kernel makes, and where it is best.
 
 use super::batch;
-use super::catalogue::Request;
 use super::mode::{CUBIC, FCC, GLASS_2D, GLASS_3D, HEXAGONAL, JITTER_2D, JITTER_3D, LINE, SQUARE, Sample};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
+use super::request::Request;
 use super::setup::setup;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;

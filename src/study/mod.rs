@@ -11,6 +11,7 @@
 //! | `run` | the run and its snapshots |
 //! | `report` | accuracy against run time |
 //! | `catalogue` | studies of the library itself, by name |
+//! | `request` | what they are asked for and answer |
 //! | `accuracy`, `kernels`, `convergence`, `work` | studies of accuracy |
 //! | `peers` | other codes, on the same particles in the same run |
 //! | `positivity` | of anisotropic operators |
@@ -38,6 +39,7 @@ pub mod peers;
 pub mod plot;
 pub mod positivity;
 pub mod report;
+pub mod request;
 pub mod run;
 pub mod samples;
 pub mod scene;

@@ -9,11 +9,11 @@
 
 mod python;
 
-use super::catalogue::Request;
 use super::mode::JITTER_3D;
 use super::page::Page;
 use super::plot::Style;
 use super::report::Accuracy;
+use super::request::Request;
 use super::scene::Scene;
 use super::setup::{at_all, setup};
 use super::table::{Cell, Table, column, short};

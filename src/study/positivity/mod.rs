@@ -6,9 +6,9 @@
 
 mod lattice;
 
-use super::catalogue::Request;
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
+use super::request::Request;
 use super::table::{Table, column, short};
 use crate::error::Result;
 use lattice::{Form, Neighbours};

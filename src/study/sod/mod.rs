@@ -4,11 +4,11 @@ pub mod riemann;
 mod tube;
 
 use super::batch;
-use super::catalogue::Request;
 use super::kernels::Moments;
 use super::mode::{FCC, LINE, Sample};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
+use super::request::Request;
 use super::table::{Cell, Table, column, short};
 use crate::error::Result;
 use crate::kernel;

@@ -32,7 +32,7 @@ mod time;
 mod trial;
 
 use super::batch;
-use super::catalogue::{Answer, Request};
+use super::request::{Answer, Request};
 use super::run::Watch;
 use crate::error::Result;
 pub use seen::Seen;

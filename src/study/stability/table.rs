@@ -2,8 +2,8 @@
 
 use super::{Case, Expect, Seen, Trial};
 use crate::error::{Error, Result};
-use crate::study::catalogue::Answer;
 use crate::study::page::Page;
+use crate::study::request::Answer;
 use crate::study::table::{Cell, Table, column};
 use serde::Serialize;
 use std::fmt::Write;

@@ -4,10 +4,10 @@ mod choices;
 mod front;
 mod reference;
 
-use super::catalogue::Request;
 use super::mode::{Cloud, JITTER_2D, JITTER_3D};
 use super::page::Page;
 use super::plot::{Axis, Plot, Style};
+use super::request::Request;
 use super::run::Study;
 use super::scene::Scene;
 use super::table::{Cell, Table, column, short};
