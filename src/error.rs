@@ -15,7 +15,7 @@ pub enum Error {
     )]
     StepTooLarge { dt: f64, needed: f64, allowed: u64, remedy: String },
     #[error(
-        "{what} became {value} at particle {index}; nothing was changed: take a smaller dt or check the source and kappa there"
+        "{what} became {value} at particle {index}; nothing was changed: check what was set there (source, kappa, c_v, h_conv, flux_in), or take a smaller dt"
     )]
     NotFinite { what: String, index: usize, value: f64 },
     #[error(
@@ -63,7 +63,7 @@ pub enum Error {
     #[error("{path}: {reason}; no particle was read")]
     BadFile { path: String, reason: String },
     #[error(
-        "{what} needs {bytes} bytes, {available} are available; use fewer neighbours (smaller h_fac), fewer particles, or raise memory="
+        "there is no room for the {bytes} bytes of {what} ({available} are said to be available in all); use fewer particles, fewer neighbours (smaller h_fac), or raise memory= where that is the limit"
     )]
     NoMemory { what: String, bytes: u64, available: u64 },
 

@@ -129,6 +129,11 @@ impl<'a> Adaptive<'a> {
         sum::max(self.pool, self.rate.len(), |i| self.rate[i].abs()) <= 0.0
     }
 
+    /// A rate at the beginning that is no number, with its place: no sub-step is short enough.
+    pub fn first_bad_rate(&self) -> Option<(usize, f64)> {
+        sum::first(self.pool, self.rate.len(), |i| !self.rate[i].is_finite()).map(|i| (i, self.rate[i]))
+    }
+
     /// How far y has come from its beginning, root mean square.
     pub fn moved(&self, y: &[f64]) -> f64 {
         sum::rms(self.pool, y.len(), |i| self.weight[i], |i| y[i] - self.start[i])

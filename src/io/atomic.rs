@@ -1,6 +1,7 @@
 //! Files that are either whole or not there: written under a temporary name in the same folder, flushed, synced, renamed,
 //! and the folder synced. Whoever polls the folder never sees half a file; a full disk leaves the old one intact.
 
+use super::limit::Quiet;
 use crate::error::{Error, Result};
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{self, BufWriter, Write};
@@ -26,10 +27,56 @@ pub struct Prepared {
 }
 
 impl Prepared {
-    /// Gives the file its name.
+    /// Gives the file its name, for good.
     pub fn publish(self) -> Result<()> {
-        let done = std::fs::rename(&self.temporary.path, &self.path).and_then(|()| self.folder.map_or(Ok(()), sync));
-        done.map_err(|e| failed(&self.path, &e))
+        self.name()?.sync()
+    }
+
+    /// Gives the file its name.
+    pub fn name(self) -> Result<Named> {
+        std::fs::rename(&self.temporary.path, &self.path).map_err(|e| failed(&self.path, &e))?;
+        Ok(Named { path: self.path, folder: self.folder })
+    }
+}
+
+/// A file that has its name, though a failing machine may forget it until the folder is synced.
+pub struct Named {
+    path: PathBuf,
+    folder: Option<File>,
+}
+
+impl Named {
+    pub fn sync(self) -> Result<()> {
+        self.folder.map_or(Ok(()), sync).map_err(|e| {
+            let reason = format!("it is written, but the disk does not say that it will stay: {e}");
+            Error::Io { path: self.path.display().to_string(), reason }
+        })
+    }
+}
+
+/// What was at a path before a new file takes its place, until it is clear that the new one stays.
+pub struct Before {
+    path: PathBuf,
+    /// Another name of the old file, where there was one.
+    kept: Option<Temporary>,
+    was_there: bool,
+}
+
+impl Before {
+    pub fn of(path: &Path) -> Before {
+        let was_there = path.exists();
+        let kept = was_there.then(|| Temporary::link(path).ok()).flatten();
+        Before { path: path.into(), kept, was_there }
+    }
+
+    /// Puts things back as they were.
+    pub fn restore(self) {
+        let _ = match (&self.kept, self.was_there) {
+            (Some(kept), _) => std::fs::rename(&kept.path, &self.path),
+            (None, false) => std::fs::remove_file(&self.path),
+            // The file system has no second names: the new file is a whole one as well.
+            (None, true) => Ok(()),
+        };
     }
 }
 
@@ -70,6 +117,7 @@ pub(super) fn folder_of(path: &Path) -> &Path {
 }
 
 fn fill_and_sync(file: File, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> io::Result<()> {
+    let _quiet = Quiet::begin();
     let mut sink = BufWriter::with_capacity(1 << 16, file);
     fill(&mut sink)?;
     sink.flush()?;
@@ -95,6 +143,14 @@ const HEAD: &str = ".diffusph.";
 const TAIL: &str = ".tmp";
 
 impl Temporary {
+    /// Another name of a file that is there.
+    fn link(path: &Path) -> io::Result<Temporary> {
+        let temporary = Temporary::create(folder_of(path))?;
+        std::fs::remove_file(&temporary.path)?;
+        std::fs::hard_link(path, &temporary.path)?;
+        Ok(temporary)
+    }
+
     fn create(folder: &Path) -> io::Result<Temporary> {
         static COUNT: AtomicU64 = AtomicU64::new(0);
         remove_stale(folder);
@@ -179,6 +235,21 @@ mod tests {
         assert!(text.contains("a.vtu") && text.contains("no storage space"), "{text}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(names(dir.path()), ["a.vtu"]);
+    }
+
+    #[test]
+    fn what_was_there_before_can_come_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let (old, new) = (dir.path().join("old.vtu"), dir.path().join("new.vtu"));
+        std::fs::write(&old, "old").unwrap();
+        for path in [&old, &new] {
+            let before = Before::of(path);
+            replace(path, |sink| sink.write_all(b"new")).unwrap();
+            before.restore();
+        }
+        assert_eq!((std::fs::read_to_string(&old).unwrap().as_str(), new.exists()), ("old", false));
+        drop(Before::of(&old));
+        assert_eq!(names(dir.path()), ["old.vtu"]);
     }
 
     #[test]

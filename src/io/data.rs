@@ -1,20 +1,10 @@
 //! Numbers in the types that files have them in.
 
 use super::broken;
+use super::element::Element;
 use super::view::Values;
 use crate::error::{Error, Result};
 use crate::memory;
-
-/// A number as VTK files store it.
-pub trait Element: bytemuck::Pod + std::str::FromStr {
-    /// The name of the type in VTK's XML files, e.g. `Float64`.
-    const NAME: &'static str;
-
-    fn wrap(values: Vec<Self>) -> Data;
-
-    /// The same number as f64, if f64 has it.
-    fn exact(self) -> Option<f64>;
-}
 
 /// Something that yields values of any asked type: see [`Data::read_as`].
 pub(super) trait ReadValues {
@@ -66,10 +56,6 @@ macro_rules! kinds {
 
         $(impl Element for $type {
             const NAME: &'static str = $name;
-
-            fn wrap(values: Vec<Self>) -> Data {
-                Data::$variant(values)
-            }
 
             fn exact(self) -> Option<f64> {
                 let wide = self as f64;

@@ -5,7 +5,8 @@
 //! The format: <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>.
 
 use super::broken;
-use super::data::{Data, Element, Fault, Found, ReadValues, unless_fatal};
+use super::data::{Data, Fault, Found, ReadValues, unless_fatal};
+use super::element::Element;
 use super::snapshot::{Field, LONGEST_NOTE, LeftAside, Snapshot};
 use crate::error::{Error, Result};
 use crate::memory;

@@ -16,8 +16,10 @@
 
 pub mod atomic;
 mod data;
+mod element;
 mod legacy;
 mod legacy_read;
+mod limit;
 mod payload;
 mod pvd;
 #[cfg(test)]
@@ -29,7 +31,8 @@ mod xml;
 mod xml_read;
 mod xml_write;
 
-pub use data::{Data, Element};
+pub use data::Data;
+pub use element::Element;
 pub use pvd::{Entry, Series};
 pub use snapshot::{Field, LeftAside, OF_CELLS, Snapshot};
 pub use view::{Column, Values, View};

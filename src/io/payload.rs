@@ -4,7 +4,8 @@
 //! Sizes in a file are claims. Each is checked against the bytes that are there before memory is reserved for it.
 
 use super::broken;
-use super::data::{Element, Fault, Found};
+use super::data::{Fault, Found};
+use super::element::Element;
 use crate::error::{Error, Result};
 use crate::memory;
 use std::borrow::Cow;

@@ -1,6 +1,6 @@
 //! Time series: a `.pvd` file lists snapshots with their times, for ParaView and pyvista.
 
-use super::atomic::{self, Prepared};
+use super::atomic::{self, Before, Prepared};
 use super::{broken, in_file, words, xml};
 use crate::error::{Error, Result};
 use std::collections::{HashMap, HashSet};
@@ -53,7 +53,7 @@ impl Series {
         if !listed.is_file() {
             return Err(Error::bad("file", file.display(), "list a snapshot after it has been written"));
         }
-        self.publish(time, file, || Ok(()))
+        self.publish(time, file, None)
     }
 
     /// Writes the next snapshot, of this time, and lists it; answers its path. As [`Series::append`], and `write` prepares
@@ -61,26 +61,38 @@ impl Series {
     pub fn write(&mut self, time: f64, write: impl FnOnce(&Path) -> Result<Prepared>) -> Result<PathBuf> {
         let path = self.next_file(time);
         let snapshot = write(&path)?;
-        self.publish(time, &path, || snapshot.publish())?;
+        self.publish(time, &path, Some(snapshot))?;
         Ok(path)
     }
 
-    fn publish(&mut self, time: f64, file: &Path, snapshot: impl FnOnce() -> Result<()>) -> Result<()> {
+    fn publish(&mut self, time: f64, file: &Path, snapshot: Option<Prepared>) -> Result<()> {
         if !time.is_finite() {
             return Err(Error::bad("time", time, "the time of a snapshot must be finite"));
         }
-        let file = self.listed(file).to_str().filter(|f| !f.chars().any(char::is_control));
-        let file = file.ok_or_else(|| Error::bad("file", "its name", "a listed file needs a name in plain Unicode"))?;
-        let new = Entry { time, file: file.into(), others: vec![("part".into(), "0".into())] };
+        let listed = self.listed(file).to_str().filter(|f| !f.chars().any(char::is_control));
+        let name = || format!("'{}'", file.display().to_string().escape_debug());
+        let rule =
+            "the name of a listed file, and with it that of the list, must be Unicode without control characters";
+        let listed = listed.ok_or_else(|| Error::bad("path", name(), rule))?;
+        let new = Entry { time, file: listed.into(), others: vec![("part".into(), "0".into())] };
         let earlier = self.entries.iter().filter(|e| e.time < time).cloned();
         let entries: Vec<Entry> = earlier.chain([new]).collect();
         let text = format(&entries);
         let list = atomic::prepare(&self.path, |sink| std::io::Write::write_all(sink, text.as_bytes()))?;
-        snapshot()?;
-        list.publish()?;
+        let old = snapshot.as_ref().map(|_| Before::of(file));
+        if let Some(snapshot) = snapshot {
+            snapshot.publish()?;
+        }
+        let list = match list.name() {
+            Ok(list) => list,
+            Err(e) => {
+                old.into_iter().for_each(Before::restore);
+                return Err(e);
+            }
+        };
         let before = std::mem::replace(&mut self.entries, entries);
         self.remove_unlisted(&before);
-        Ok(())
+        list.sync()
     }
 
     /// A file as the list names it.

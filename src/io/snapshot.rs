@@ -57,11 +57,16 @@ impl Snapshot {
         self.fields.iter().find(|f| f.name == name)
     }
 
-    /// What the file has that is not read, and what else is to be known of it, in words.
-    pub fn told(&self) -> Vec<String> {
+    /// What the file has that is not read, and what else is to be known of it, in words. `is_taken`: of the arrays that are
+    /// read, which one is used.
+    pub fn told(&self, is_taken: impl Fn(&Field) -> bool) -> Vec<String> {
         let unused = |l: &LeftAside| format!("array '{}' is left aside: {}", l.name, l.reason);
         let of_cells = |name: &String| format!("array '{name}' is one {OF_CELLS}");
-        let arrays = self.left_aside.iter().map(unused).chain(self.of_cells.iter().map(of_cells));
+        let unneeded = self.fields.iter().filter(|field| !is_taken(field)).map(|field| match field.components {
+            1 => format!("array '{}' is left aside: it is none of the inputs", field.name),
+            n => format!("array '{}' is left aside: an input has one component, not {n}", field.name),
+        });
+        let arrays = self.left_aside.iter().map(unused).chain(unneeded).chain(self.of_cells.iter().map(of_cells));
         self.remarks.iter().cloned().chain(arrays).collect()
     }
 

@@ -62,6 +62,9 @@ fn read_until(file: &mut File, bytes: &mut Vec<u8>, from: usize, pattern: &[u8])
         if let Some(place) = find(&bytes[from..], pattern) {
             return Ok(Some(from + place));
         }
+        if bytes[from..].contains(&0) {
+            return Err(broken("it is no XML: there is a byte 0 where text should be"));
+        }
         from = from.max((bytes.len() + 1).saturating_sub(pattern.len()));
         let step = 1 << 16;
         bytes
@@ -98,6 +101,15 @@ fn text_after(file: &mut File, mut text: Vec<u8>) -> Result<Vec<u8>> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_is_no_text_is_not_read_to_its_end() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.vtu");
+        File::create(&path).unwrap().set_len(1 << 40).unwrap(); // a hole
+        let error = Split::of(&mut File::open(&path).unwrap()).err().unwrap().to_string();
+        assert!(error.contains("no XML"), "{error}");
+    }
 
     #[test]
     fn marks_are_found_wherever_the_reading_stops() {

@@ -1,6 +1,6 @@
 //! What a writer writes, borrowed: a solver's arrays go to the file without a second copy.
 
-use super::data::Element;
+use super::element::Element;
 use crate::error::{Error, Result};
 use std::borrow::Cow;
 

@@ -2,7 +2,8 @@
 //!
 //! The format: <https://docs.vtk.org/en/latest/design_documents/VTKFileFormats.html>.
 
-use super::data::{Data, Element, Fault, Found, ReadValues, extend, unless_fatal};
+use super::data::{Data, Fault, Found, ReadValues, extend, unless_fatal};
+use super::element::Element;
 use super::payload::{Compressor, Layout, Payload};
 use super::snapshot::{Field, LeftAside, Snapshot};
 use super::split::{Appended, Split};

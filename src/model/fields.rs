@@ -97,7 +97,13 @@ pub static FIELDS: &[Field] = &[
     input("b_x", "-", Finite, None, "direction of kappa_par, of any length and sign; 0: kappa_perp in all directions"),
     input("b_y", "-", Finite, None, "its second component"),
     input("b_z", "-", Finite, None, "its third component"),
-    input("kappa_xx", "W/(m K)", NonNegative, None, "symmetric tensor in place of kappa; components not set are 0"),
+    input(
+        "kappa_xx",
+        "W/(m K)",
+        NonNegative,
+        None,
+        "symmetric tensor in place of kappa; components not set are 0; kappa_ij sets all of them",
+    ),
     input("kappa_yy", "W/(m K)", NonNegative, None, "its second diagonal component"),
     input("kappa_zz", "W/(m K)", NonNegative, None, "its third diagonal component"),
     input("kappa_xy", "W/(m K)", Finite, None, "its component xy"),
@@ -231,6 +237,9 @@ pub const SIGMA_SB: f64 = 5.670374419e-8;
 pub fn slot(name: &str) -> Result<Slot> {
     let inputs = &FIELDS[..INPUTS];
     inputs.iter().position(|f| f.name == name).ok_or_else(|| match FIELDS.iter().find(|f| f.name == name) {
+        Some(_) if name == "x" => {
+            Error::bad("name", "'x'", "positions are set for each particle, by set_particles or set")
+        }
         Some(_) => Error::bad("name", format!("'{name}'"), "this quantity is computed, it cannot be set"),
         None => Error::unknown("field", name, inputs.iter().map(|f| f.name)),
     })

@@ -135,6 +135,15 @@ impl Surface {
         self.members.iter().all(|(_, e)| e.emissivity == 0.0)
     }
 
+    /// The particles that radiate.
+    pub fn radiating(&self) -> impl Iterator<Item = usize> + '_ {
+        let radiates = self.sigma_sb > 0.0;
+        self.members
+            .iter()
+            .filter(move |(_, e)| radiates && e.emissivity > 0.0 && e.area > 0.0)
+            .map(|(m, _)| m.particle as usize)
+    }
+
     /// The bounds of what T may become that starts between these: the surroundings of what exchanges with them are in
     /// between as well, and nothing bounds the side on which a flux is given.
     pub fn reached(&self, mut low: f64, mut high: f64) -> (f64, f64) {

@@ -7,12 +7,8 @@
 //! a tolerance, where sdirk2 takes dt in one sub-step, up to 150, and up to 500 where that step makes the levels. Bounds
 //! are kept by sub-steps that are rejected where they leave them.
 
-use super::Plan;
-use super::motion::explicit_limit;
-use super::state::State;
 use crate::error::Result;
 use crate::integrator::{self, Method};
-use crate::model::fields;
 
 /// Of a step that is not stiff, and of one that is.
 const LIGHT: &str = "rkl2";
@@ -50,7 +46,7 @@ impl Auto {
     }
 
     /// The method for a step of so many explicit limits, of an operator that can be solved for or not.
-    fn choose(&mut self, stiffness: f64, controlled: bool, solvable: bool) -> Result<&'static Method> {
+    pub fn choose(&mut self, stiffness: f64, controlled: bool, solvable: bool) -> Result<&'static Method> {
         let most = if controlled { CONTROLLED } else { FREE };
         let stiff = stiffness > most;
         let name = if stiff && solvable { HEAVY } else { LIGHT };
@@ -59,28 +55,6 @@ impl Auto {
             _ => format!("{name} because dt is {} explicit limits; {HEAVY} pays beyond {most}", rounded(stiffness)),
         };
         integrator::find(name)
-    }
-}
-
-impl State {
-    /// Chooses the method for a step, where that is left to us; says whether it is another one than before.
-    ///
-    /// # Errors
-    /// As [`State::bounds`].
-    pub fn choose(&mut self, plan: &Plan, dt: f64) -> Result<bool> {
-        if self.choices.auto.is_none() {
-            return Ok(false);
-        }
-        let (t, time) = (self.each(fields::T)?, self.time);
-        let bounds = self.with_motion(plan, |motion| {
-            let known = motion.known_or_proven(time, &t)?.proven;
-            motion.with_cooling(known, time, &t)
-        })?;
-        let (stiffness, choices) = (dt / explicit_limit(bounds), &mut self.choices);
-        let (controlled, solvable) = (choices.tolerance.is_some(), choices.operator.dissipative);
-        let Some(auto) = &mut choices.auto else { return Ok(false) };
-        let before = std::mem::replace(&mut choices.method, auto.choose(stiffness, controlled, solvable)?);
-        Ok(before.name != choices.method.name)
     }
 }
 

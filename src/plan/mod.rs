@@ -6,6 +6,7 @@ pub mod choices;
 pub mod facts;
 pub mod given;
 pub mod input;
+mod known;
 pub mod motion;
 pub mod passes;
 pub mod preconditioner;
@@ -81,7 +82,7 @@ impl fmt::Display for Plan {
             };
             let size = |v: f64, unit: &str| if v == 0.0 { String::new() } else { format!("{}{unit}", readable(v)) };
             let (bytes, pairs) = (size(pass.cost.bytes, "B"), size(pass.cost.pairs, " pairs"));
-            let line = format!("  {when:<11}{:<10}{bytes:>9} {pairs:>12}  {}", pass.pass.name, pass.about);
+            let line = format!("  {when:<11}{:<10}{bytes:>9} {pairs:>12}  {}", pass.pass.name.0, pass.about);
             writeln!(f, "{}", line.trim_end())?;
         }
         let mut section = |title: &str, rules: &[&Rule]| -> fmt::Result {

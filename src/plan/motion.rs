@@ -1,7 +1,7 @@
 //! The stages of a step: bounds on the operator, the schedule that follows from them, sub-steps on a private copy of T.
 
-use super::report::{Report, Timers};
-use super::state::Progress;
+use super::known::Known;
+use super::report::{Progress, Report, Timers};
 use super::{Choices, Plan, passes, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{
@@ -37,17 +37,6 @@ pub struct Motion<'a> {
     pub range: Range,
 }
 
-/// Bounds on an operator.
-#[derive(Debug, Clone, Copy)]
-pub struct Known {
-    /// Gershgorin's: what every step finds first, whatever steps were before it.
-    pub proven: Bounds,
-    /// The same, lowered by power iteration, where that was needed.
-    refined: Option<Bounds>,
-    /// No bound on the spectrum can be less.
-    floor: f64,
-}
-
 impl System for Heat<'_> {
     fn rate(&mut self, t: f64, y: &[f64], dy: &mut [f64]) -> Result<()> {
         Heat::rate(self, t, y, dy)
@@ -60,8 +49,7 @@ impl System for Heat<'_> {
     fn linearise(&mut self, t: f64, y: &[f64], diagonal: &mut [f64], weight: &mut [f64]) -> Result<Linear> {
         let circles = self.circles(t, y)?;
         if let Some(i) = sum::first(self.pool, circles.len(), |i| !circles[i].1.is_finite()) {
-            let rule = "too large: its product with the pair weights exceeds all numbers";
-            return Err(Error::bad_at("kappa", self.host[i] as usize, "given", rule));
+            return Err(too_stiff(self.host[i] as usize));
         }
         diagonal.iter_mut().zip(&circles).for_each(|(d, circle)| *d = circle.1);
         weight.iter_mut().zip(self.inverse_capacity).for_each(|(w, &i)| *w = heat::capacity(i));
@@ -97,6 +85,12 @@ impl System for Heat<'_> {
     }
 }
 
+/// A rate that no number holds.
+fn too_stiff(particle: usize) -> Error {
+    let rule = "its product with pair weights, or h_conv, over m c_v exceeds all numbers: check kappa, m, c_v and h_conv there";
+    Error::bad_at("kappa", particle, "too large", rule)
+}
+
 /// The equations of a stage as the preconditioner takes them.
 fn fine<'a>(pool: &'a Pool, Shifted { g, diagonal, weight }: Shifted<'a>) -> Fine<'a> {
     Fine { pool, g, diagonal, weight }
@@ -126,7 +120,7 @@ impl Motion<'_> {
             true => self.march(time, dt, t, report)?,
             false => self.adapt(time, dt, t, report)?,
         }
-        self.timers.add(if method.is_implicit() { &passes::SOLVE } else { &passes::STAGES }, start.elapsed());
+        self.timers.add(if method.is_implicit() { passes::SOLVE.name } else { passes::STAGES.name }, start.elapsed());
         Ok(())
     }
 
@@ -177,6 +171,9 @@ impl Motion<'_> {
             explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.proven } else { bounds });
         let control = Control { method, tolerance: choices.tolerance, range: self.range };
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
+        if let Some((i, value)) = pace.first_bad_rate() {
+            return Err(Error::NotFinite { what: "dT/dt".into(), index: self.heat.host[i] as usize, value });
+        }
         if pace.is_still() && self.heat.is_autonomous() {
             (report.substeps, report.stages) = (1, 1);
             report.came_in(dt, self.heat.tally());
@@ -240,7 +237,10 @@ impl Motion<'_> {
             None => {
                 // As many again for what is left, or one for each sub-step where nothing is done yet.
                 let ahead = if rest > 0.0 { rest / part } else { 0.0 };
-                let needed = (applications as f64 * dt / (dt - rest)).min(applications as f64 + ahead);
+                let needed = match over {
+                    true => (applications as f64 * dt / (dt - rest)).min(applications as f64 + ahead),
+                    false => ahead,
+                };
                 Error::StepTooLarge { dt, needed, allowed, remedy: self.choices.method.remedy().into() }
             }
         })
@@ -309,7 +309,7 @@ impl Motion<'_> {
         let enough = self.plan.leaves_out(&rules::PROVEN_BOUND) && self.is_least_work(dt, known, cooling);
         let bounds = if enough { known.proven } else { self.refined(known, time, t)? };
         let bounds = raised(bounds, cooling);
-        self.timers.add(&passes::BOUND, start.elapsed());
+        self.timers.add(passes::BOUND.name, start.elapsed());
         Ok(bounds)
     }
 
@@ -379,7 +379,7 @@ impl Motion<'_> {
     fn refuse_growing_modes(&mut self, time: f64, t: &[f64]) -> Result<()> {
         let start = Instant::now();
         let (growth, fastest) = self.growth(time, t)?;
-        self.timers.add(&passes::SPECTRUM, start.elapsed());
+        self.timers.add(passes::SPECTRUM.name, start.elapsed());
         if growth <= GROWS * fastest || self.choices.allow.unstable {
             return Ok(());
         }
@@ -406,10 +406,10 @@ impl Motion<'_> {
         let proven = Bounds { spectral: largest(|c| c.0 + c.1), diagonal: largest(|c| c.0.max(c.1)) };
         // An eigenvalue of a symmetric operator is at least the largest diagonal element; of others nothing is known.
         let floor = if self.choices.operator.dissipative { largest(|c| c.1) } else { 0.0 };
-        self.timers.add(&passes::CIRCLES, start.elapsed());
-        match proven.spectral.is_finite() {
-            true => Ok(Known { proven, refined: None, floor }),
-            false => Err(Error::bad("kappa", "too large", "its product with the pair weights exceeds all numbers")),
+        self.timers.add(passes::CIRCLES.name, start.elapsed());
+        match sum::first(self.pool, circles.len(), |i| !(circles[i].0 + circles[i].1).is_finite()) {
+            None => Ok(Known { proven, refined: None, floor }),
+            Some(i) => Err(too_stiff(self.heat.host[i] as usize)),
         }
     }
 

@@ -1,6 +1,7 @@
 //! What is done for a step, in order: one table. A scene's plan lists the rows that it wants, preparing runs those that make
 //! something, and the clock has their names, so that the three cannot differ.
 
+use super::report::Name;
 use super::state::State;
 use super::{Choices, Facts, Plan, rules};
 use crate::error::Result;
@@ -18,7 +19,7 @@ pub enum When {
 
 /// A row of the table.
 pub struct Pass {
-    pub name: &'static str,
+    pub name: Name,
     /// How often it runs in a scene; none where it is not wanted.
     pub when: fn(&Scene) -> Option<When>,
     /// What it does there.
@@ -37,7 +38,7 @@ impl PartialEq for Pass {
 
 impl std::fmt::Debug for Pass {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
-        f.write_str(self.name)
+        f.write_str(self.name.0)
     }
 }
 
@@ -119,21 +120,21 @@ macro_rules! table {
 
 table! {
     SORT = Pass {
-        name: "sort",
+        name: Name("sort"),
         when: |s| s.setup(),
         about: |_| "particles along a Morton curve".into(),
         cost: |s| s.cost([0.0, 8.0 * s.facts.dim as f64 + 4.0], 0.0),
         make: None,
     };
     DENSITY = Pass {
-        name: "density",
+        name: Name("density"),
         when: |s| s.setup_if(s.facts.finds_h || s.facts.sums_rho),
         about: |s| if s.facts.finds_h { "rho and h together" } else { "rho by summation" }.into(),
         cost: |s| s.cost([0.0, 16.0], 1.0),
         make: None,
     };
     WEIGHTS = Pass {
-        name: "weights",
+        name: Name("weights"),
         when: |s| s.setup(),
         about: |s| {
             let evaluations = if s.leaves_out(&rules::SAME_H) { "one kernel evaluation" } else { "two kernel evaluations" };
@@ -143,7 +144,7 @@ table! {
         make: Some(State::make_weights),
     };
     JOIN = Pass {
-        name: "join",
+        name: Name("join"),
         when: |s| s.setup_if(s.choices.operator.joins_rows()),
         about: |s| match s.choices.operator.join {
             Join::Pairs => "normalised pairs beside free surfaces".into(),
@@ -156,119 +157,119 @@ table! {
         make: Some(State::join_weights),
     };
     NORMALISE = Pass {
-        name: "normalise",
+        name: Name("normalise"),
         when: |s| s.setup_if(s.choices.normalise != Normalise::No && !s.choices.operator.is_projected()),
         about: |s| s.choices.normalise.about().into(),
         cost: |s| s.cost([0.0, s.choices.normalise.bytes(s.facts.dim)], 1.0),
         make: Some(State::normalise_weights),
     };
     WALLS = Pass {
-        name: "walls",
+        name: Name("walls"),
         when: |s| s.setup_if(s.facts.walls),
         about: |_| "exchanges with particles of fixed T, completed by what lies behind them".into(),
         cost: NO_COST,
         make: Some(State::complete_walls),
     };
     SWEEPS = Pass {
-        name: "sweeps",
+        name: Name("sweeps"),
         when: |s| s.setup_if(s.facts.twice),
         about: |_| "slopes of gradient and divergence".into(),
         cost: |s| s.cost(s.choices.operator.bytes_of_sweeps(), 1.0),
         make: Some(State::make_sweeps),
     };
     TRUST = Pass {
-        name: "trust",
+        name: Name("trust"),
         when: |s| s.setup(),
         about: |_| "no weight is NaN, and volumes fit distances".into(),
         cost: NO_COST,
         make: Some(State::trust_weights),
     };
     FOLD = Pass {
-        name: "fold",
+        name: Name("fold"),
         when: |s| s.setup_if(s.folds()),
         about: |s| format!("{} mean of kappa into the weights", s.facts.mean.name()),
         cost: |s| s.cost([0.0; 2], 1.0),
         make: Some(State::fold_kappa),
     };
     RATE = Pass {
-        name: "rate",
+        name: Name("rate"),
         when: |s| (!s.moves_t()).then_some(When::EachStep),
         about: |_| "du/dt for a host that integrates itself".into(),
         cost: |s| s.cost([0.0; 2], 1.0),
         make: None,
     };
     CIRCLES = Pass {
-        name: "circles",
+        name: Name("circles"),
         when: |s| if s.facts.kappa_of_t { Some(When::EachStep) } else { s.setup() }.filter(|_| s.moves_t()),
         about: |_| "Gershgorin's circles: a bound on every rate".into(),
         cost: |s| s.cost([0.0; 2], 1.0),
         make: None,
     };
     BOUND = Pass {
-        name: "bound",
+        name: Name("bound"),
         when: |s| (CIRCLES.when)(s).filter(|_| !s.facts.implicit),
         about: |_| "power iteration, where it saves stages".into(),
         cost: |s| s.cost([0.0; 2], 1.0),
         make: None,
     };
     SPECTRUM = Pass {
-        name: "spectrum",
+        name: Name("spectrum"),
         when: |s| s.setup_if(s.moves_t() && !s.leaves_out(&rules::DECAYS) && !s.facts.kappa_of_t),
         about: |_| "Arnoldi's method: refused where a mode grows".into(),
         cost: |s| s.cost([0.0, 320.0], 40.0),
         make: None,
     };
     KAPPA = Pass {
-        name: "kappa",
+        name: Name("kappa"),
         when: |s| each_stage(s.moves_t() && s.facts.kappa_of_t),
         about: |_| "kappa(T)".into(),
         cost: |s| s.cost([0.0, 8.0], 0.0),
         make: None,
     };
     SOLVE = Pass {
-        name: "solve",
+        name: Name("solve"),
         when: |s| each_stage(s.moves_t() && s.facts.implicit),
         about: |s| s.motion(&format!("conjugate gradients on rows of weights; {}", s.facts.preconditioning.about)),
         cost: |s| s.cost([0.0, 8.0 * s.facts.buffers], 1.0),
         make: None,
     };
     STAGES = Pass {
-        name: "stages",
+        name: Name("stages"),
         when: |s| each_stage(s.moves_t() && !s.facts.implicit),
         about: |s| s.motion("rows of weights"),
         cost: |s| s.cost([0.0, 8.0 * s.facts.buffers], 1.0),
         make: None,
     };
     SURFACE = Pass {
-        name: "surface",
+        name: Name("surface"),
         when: |s| each_stage(!s.leaves_out(&rules::NO_WALL)),
         about: |_| "exchange with the outside".into(),
         cost: |s| Cost { bytes: 48.0 * s.facts.exchanging as f64, pairs: 0.0 },
         make: None,
     };
     SOURCE = Pass {
-        name: "source",
+        name: Name("source"),
         when: |s| each_stage(!s.leaves_out(&rules::NO_SOURCE)),
         about: |_| "heat released in the volume".into(),
         cost: |s| s.cost([0.0, 8.0], 0.0),
         make: None,
     };
     NORM = Pass {
-        name: "norm",
+        name: Name("norm"),
         when: |s| (s.moves_t() && !s.leaves_out(&rules::POSITIVE)).then_some(When::EachStep),
         about: |_| "of T before and after: no growth".into(),
         cost: NO_COST,
         make: None,
     };
     CHECK = Pass {
-        name: "check",
+        name: Name("check"),
         when: |s| s.moves_t().then_some(When::EachStep),
         about: |s| if s.facts.keeps_bounds { "finite, within the bounds of before" } else { "finite" }.into(),
         cost: NO_COST,
         make: None,
     };
     COMMIT = Pass {
-        name: "commit",
+        name: Name("commit"),
         when: |s| s.moves_t().then_some(When::EachStep),
         about: |_| "the new state replaces the old".into(),
         cost: NO_COST,

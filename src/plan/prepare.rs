@@ -61,7 +61,7 @@ impl State {
         for pass in plan.passes.iter().map(|line| line.pass).filter(|pass| wanted(pass)) {
             let start = std::time::Instant::now();
             if pass.make.map_or(Ok(false), |make| make(self, plan))? {
-                self.timers.add(pass, start.elapsed());
+                self.timers.add(pass.name, start.elapsed());
             }
         }
         Ok(())
@@ -143,10 +143,10 @@ impl State {
             let made = self.make_geometry(call, true);
             self.inputs[fields::H] = Input::Unset;
             self.geometry = Some(made?);
-            self.timers.add(&passes::DENSITY, start.elapsed());
+            self.timers.add(passes::DENSITY.name, start.elapsed());
         } else {
             self.geometry = Some(self.make_geometry(call, false)?);
-            self.timers.add(&passes::SORT, start.elapsed());
+            self.timers.add(passes::SORT.name, start.elapsed());
         }
         Ok(())
     }
@@ -381,8 +381,7 @@ impl State {
     pub(super) fn trust_weights(&mut self, plan: &Plan) -> Result<bool> {
         self.change_weights(plan, |state, _, weights| {
             if let Some(i) = weights.matrix.first_bad(&state.pool) {
-                let what = "a pair weight".to_string();
-                return Err(Error::NotFinite { what, index: state.host(i), value: f64::NAN });
+                return Err(state.odd_volume(weights.matrix.columns(i)));
             }
             let Some(Normals { moments, paired, defect, .. }) = weights.normals.take() else { return Ok(()) };
             if weights.moments.is_empty() {
@@ -391,6 +390,17 @@ impl State {
             (weights.paired, weights.defect) = (paired.contains(&true), defect);
             state.refuse_wrong_volumes(&weights.matrix, &weights.moments)
         })
+    }
+
+    /// What is wrong with a row of weights that are no numbers: the volume farthest from the others.
+    fn odd_volume(&self, row: &[u32]) -> Error {
+        let volume = |i: u32| self.geometry.as_ref().map_or(1.0, |g| g.volume[i as usize]);
+        let mean = row.iter().map(|&i| volume(i).ln()).sum::<f64>() / row.len().max(1) as f64;
+        let far = |i: u32| (volume(i).ln() - mean).abs();
+        let i = row.iter().copied().max_by(|&a, &b| far(a).total_cmp(&far(b))).unwrap_or(0);
+        let rule =
+            "a volume m/rho so far from those around it makes weights that are no numbers: check m, rho and h there";
+        Error::bad_at("rho", self.host(i as usize), format!("for a volume of {:e}", volume(i)), rule)
     }
 
     /// Calls `change` with weights that are being made; they are given up where it fails.

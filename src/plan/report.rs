@@ -1,6 +1,5 @@
 //! What a step did, and what it took.
 
-use super::passes::Pass;
 use crate::integrator::Tally;
 use std::time::{Duration, Instant};
 
@@ -45,23 +44,30 @@ impl Report {
     }
 }
 
+/// Of a pass: what the plan and the clock call it. They are made in the table of passes and nowhere else.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Name(pub &'static str);
+
+/// Told what time is reached, and which share of the step is done; an answer other than 0 cancels.
+pub type Progress = Box<dyn FnMut(f64, f64) -> i32 + Send>;
+
 /// Seconds per pass and how often it ran, summed over the life of a solver.
 #[derive(Debug, Clone, Default)]
 pub struct Timers {
-    list: Vec<(&'static Pass, Duration, u64)>,
+    list: Vec<(Name, Duration, u64)>,
 }
 
 impl Timers {
     /// Runs a pass on its clock.
-    pub fn time<T>(&mut self, pass: &'static Pass, work: impl FnOnce() -> T) -> T {
+    pub fn time<T>(&mut self, pass: Name, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
         let result = work();
         self.add(pass, start.elapsed());
         result
     }
 
-    pub fn add(&mut self, pass: &'static Pass, spent: Duration) {
-        match self.list.iter_mut().find(|(timed, ..)| *timed == pass) {
+    pub fn add(&mut self, pass: Name, spent: Duration) {
+        match self.list.iter_mut().find(|(name, ..)| *name == pass) {
             Some((_, total, runs)) => (*total, *runs) = (*total + spent, *runs + 1),
             None => self.list.push((pass, spent, 1)),
         }
@@ -69,11 +75,11 @@ impl Timers {
 
     /// Passes in the order in which they first ran, with seconds.
     pub fn seconds(&self) -> impl Iterator<Item = (&'static str, f64)> {
-        self.list.iter().map(|(pass, spent, _)| (pass.name, spent.as_secs_f64()))
+        self.list.iter().map(|(pass, spent, _)| (pass.0, spent.as_secs_f64()))
     }
 
     /// How often a pass ran.
     pub fn runs(&self, pass: &str) -> u64 {
-        self.list.iter().find(|(timed, ..)| timed.name == pass).map_or(0, |(.., runs)| *runs)
+        self.list.iter().find(|(timed, ..)| timed.0 == pass).map_or(0, |(.., runs)| *runs)
     }
 }

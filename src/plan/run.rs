@@ -80,7 +80,7 @@ impl State {
             report.heat_fixed = report.energy - report.energy_before - came_in;
         }
         let made = self.made_by(dt, &t, report.energy - report.energy_before)?;
-        self.timers.add(&passes::CHECK, checked.elapsed());
+        self.timers.add(passes::CHECK.name, checked.elapsed());
 
         (self.inputs[fields::T], self.made) = (Input::Each(t), made);
         if self.energy != Energy::Follows {
@@ -94,6 +94,26 @@ impl State {
         report.iterations = self.work.iterations - iterations;
         report.seconds = start.elapsed().as_secs_f64();
         Ok(report)
+    }
+
+    /// Chooses the method for a step, where that is left to us; says whether it is another one than before.
+    ///
+    /// # Errors
+    /// As [`State::bounds`].
+    pub fn choose(&mut self, plan: &Plan, dt: f64) -> Result<bool> {
+        if self.choices.auto.is_none() {
+            return Ok(false);
+        }
+        let (t, time) = (self.each(fields::T)?, self.time);
+        let bounds = self.with_motion(plan, |motion| {
+            let known = motion.known_or_proven(time, &t)?.proven;
+            motion.with_cooling(known, time, &t)
+        })?;
+        let (stiffness, choices) = (dt / explicit_limit(bounds), &mut self.choices);
+        let (controlled, solvable) = (choices.tolerance.is_some(), choices.operator.dissipative);
+        let Some(auto) = &mut choices.auto else { return Ok(false) };
+        let before = std::mem::replace(&mut choices.method, auto.choose(stiffness, controlled, solvable)?);
+        Ok(before.name != choices.method.name)
     }
 
     /// dT/dt now.
@@ -218,7 +238,7 @@ impl State {
     fn spread(&mut self, t: &[f64]) -> f64 {
         let (Some(inverse), pool) = (&self.inverse_capacity, &self.pool) else { return 0.0 };
         let weight = |i: usize| if inverse[i] > 0.0 { 1.0 / inverse[i] } else { 0.0 };
-        self.timers.time(&passes::NORM, || sum::spread(pool, t.len(), weight, |i| t[i]))
+        self.timers.time(passes::NORM.name, || sum::spread(pool, t.len(), weight, |i| t[i]))
     }
 
     /// The host's number of a particle.
@@ -286,6 +306,7 @@ impl State {
 
     fn check(&mut self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {
         self.refuse_what_is_not_finite("T", t)?;
+        self.refuse_below_zero(t)?;
         let slack = ROUNDING * before.size + self.work.slack;
         if self.may_grow(plan) {
             let after = self.spread(t);
@@ -295,6 +316,15 @@ impl State {
             }
         }
         self.check_bounds(before.range, slack, t)
+    }
+
+    /// What radiates has an absolute temperature.
+    fn refuse_below_zero(&self, t: &[f64]) -> Result<()> {
+        let Some(surface) = &self.surface else { return Ok(()) };
+        let Some(i) = surface.radiating().find(|&i| t[i] < 0.0) else { return Ok(()) };
+        let promise =
+            "absolute temperatures keep, and radiation needs: a source or flux_in takes more than there is".into();
+        Err(Error::OutOfBounds { index: self.host(i), value: t[i], low: 0.0, high: f64::MAX, promise })
     }
 
     /// An error that names the step that the host asked for, whatever part of it failed, and advice that can be followed.

@@ -4,9 +4,9 @@
 use super::choices::Promise;
 use super::input::Energy;
 pub use super::input::Input;
-use super::motion::Known;
+use super::known::Known;
 use super::preconditioner::Preconditioning;
-use super::report::Timers;
+use super::report::{Progress, Timers};
 use super::{Choices, Facts, rules};
 use crate::error::{Error, Result};
 use crate::integrator::{Range, Work};
@@ -68,9 +68,6 @@ impl Made {
         if self.levelled > 0.0 { self.energy.abs() / self.levelled } else { 0.0 }
     }
 }
-
-/// Called between sub-steps with the time reached and the share of the step done; not 0 cancels.
-pub type Progress = Box<dyn FnMut(f64, f64) -> i32 + Send>;
 
 pub struct State {
     pub choices: Choices,

@@ -75,6 +75,7 @@ fn fields() -> Vec<Item> {
         Access::Input { default: Some(v), .. } => format!("{} [{}], set or get, default {v}", f.about, f.unit),
         Access::Input { default: None, .. } => format!("{} [{}], set or get", f.about, f.unit),
         Access::Output if f.vector => format!("{} [{}], get, dim components", f.about, f.unit),
+        Access::Output if ["x", "u", "b"].contains(&f.name) => format!("{} [{}], set or get", f.about, f.unit),
         Access::Output => format!("{} [{}], get", f.about, f.unit),
     };
     FIELDS.iter().map(|f| item(f.name, about(f))).collect()

@@ -122,7 +122,11 @@ impl Solver {
     pub fn read_vtk(&mut self, path: impl AsRef<Path>) -> Result<Vec<String>> {
         let snapshot = io::read(path)?;
         self.set_snapshot(&snapshot)?;
-        Ok(snapshot.told())
+        // What a snapshot of ours holds beside the inputs can be found again.
+        let ours = restart::is_ours(&snapshot);
+        let has_t = snapshot.field("T").is_some();
+        let is_input = |name: &str| FIELDS[..INPUTS].iter().any(|f| f.name == name) || (name == "u" && !has_t);
+        Ok(snapshot.told(|field| ours || (field.components == 1 && is_input(&field.name))))
     }
 
     /// The same from a snapshot in memory.
@@ -146,7 +150,7 @@ impl Solver {
             // An array of vectors is not the quantity of that name.
             let field = if wanted { snapshot.usable(input.name)?.filter(|f| f.components == 1) } else { None };
             match field {
-                Some(field) => found.push((slot, field.data.to_f64()?)),
+                Some(field) => found.push((slot, doubles(field)?)),
                 None if notes.is_some() && wanted => return Err(lacks(input.name)),
                 None => {}
             }
@@ -217,7 +221,12 @@ fn in_space<'a>(v: &'a [f64], dim: usize, component: impl Fn(&[f64], usize) -> f
 
 fn doubles(field: &Field) -> Result<Vec<f64>> {
     expect(&field.name, field.components, 1, "one component")?;
-    field.data.to_f64()
+    field.data.to_f64().map_err(|e| match e {
+        Error::BadElement { index, value, .. } => {
+            Error::bad_at(&field.name, index, value, "an integer without an exact double: save the array as doubles")
+        }
+        other => other,
+    })
 }
 
 fn lacks(name: &str) -> Error {
@@ -225,6 +234,10 @@ fn lacks(name: &str) -> Error {
     Error::bad("snapshot", format!("without an array {name}"), rule)
 }
 
+/// Of a file's name; a path that ends in a separator names a folder.
 fn ending(path: &Path) -> String {
+    if path.as_os_str().to_string_lossy().ends_with(std::path::is_separator) {
+        return String::new();
+    }
     path.extension().unwrap_or_default().to_string_lossy().to_ascii_lowercase()
 }

@@ -8,7 +8,7 @@ use crate::io::Snapshot;
 use crate::model::conductivity::Law;
 use crate::model::fields::{self, Access, FIELDS, INPUTS, Slot};
 use crate::plan::input::{Energy, Input};
-use crate::plan::state::State;
+use crate::plan::state::{Made, State};
 use crate::space::Domain;
 use crate::words::Words;
 use std::fmt::Write;
@@ -50,11 +50,18 @@ struct History {
     was_done_here: bool,
     /// Between what temperatures T was set.
     span: Option<Range>,
+    /// What an operator that does not conserve has done since.
+    made: Made,
 }
 
 /// The axes of a snapshot, where it says which they are.
 pub fn axes(snapshot: &Snapshot) -> Option<&str> {
     note(snapshot, AXES)
+}
+
+/// Whether a solver wrote it.
+pub fn is_ours(snapshot: &Snapshot) -> bool {
+    note(snapshot, GIVEN).is_some()
 }
 
 fn note<'a>(snapshot: &'a Snapshot, name: &str) -> Option<&'a str> {
@@ -110,9 +117,9 @@ impl Solver {
         }
         state.forget_geometry();
         (state.last_h, state.found_h) = (last_h, found_h);
-        let History { steps, rates, moves, kappa_changes, was_done_here, span } = notes.history;
+        let History { steps, rates, moves, kappa_changes, was_done_here, span, made } = notes.history;
         (state.steps, state.rates, state.moves, state.kappa_changes) = (steps, rates, moves, kappa_changes);
-        (state.was_done_here, state.span) = (was_done_here, span);
+        (state.was_done_here, state.span, state.made) = (was_done_here, span, made);
     }
 }
 
@@ -151,7 +158,12 @@ fn history(state: &State) -> String {
     let number = |flag: bool| u8::from(flag);
     let (moves, changes, here) = (number(state.moves), number(state.kappa_changes), number(state.was_done_here));
     let span = state.span.map_or(String::new(), |span| format!(" span={:?},{:?}", span.low, span.high));
-    format!("steps={} rates={} moves={moves} kappa_changes={changes} done_here={here}{span}", state.steps, state.rates)
+    let Made { energy, levelled } = state.made;
+    let made = if levelled > 0.0 { format!(" made={energy:?},{levelled:?}") } else { String::new() };
+    format!(
+        "steps={} rates={} moves={moves} kappa_changes={changes} done_here={here}{span}{made}",
+        state.steps, state.rates
+    )
 }
 
 impl Notes {
@@ -247,6 +259,11 @@ fn read_history(text: &str) -> Result<History> {
             None => None,
             Some([low, high]) if low <= high => Some(Range { low: *low, high: *high }),
             Some(_) => return Err(wrong(HISTORY, text, "span is the lowest and the highest temperature that was set")),
+        },
+        made: match words.list("made")?.as_deref() {
+            None => Made::default(),
+            Some([energy, levelled]) => Made { energy: *energy, levelled: *levelled },
+            Some(_) => return Err(wrong(HISTORY, text, "made is an energy, and what there was to level out")),
         },
     };
     words.done()?;

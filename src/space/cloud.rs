@@ -1,6 +1,6 @@
 //! The particles' positions in internal order, and the way back to the host's order.
 
-use super::{Axes, Domain, LENGTHS, LENGTHS_RULE, morton};
+use super::{Axes, Domain, OTHER_UNITS, lengths, morton, rule_of_lengths};
 use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::memory;
@@ -147,7 +147,7 @@ impl Cloud {
     ///
     /// # Errors
     /// `BadElement` for a coordinate that is not finite; `BadValue` for more than 2³² − 1 particles, or where they fill no
-    /// length of [`LENGTHS`]; `NoMemory`.
+    /// length of [`lengths`]; `NoMemory`.
     pub fn sort(domain: &Domain, x: Strided, reach: f64, pool: &Pool) -> Result<Cloud> {
         if x.len() >= u32::MAX as usize {
             return Err(Error::bad("n", x.len(), "at most 2^32 - 2 particles per solver"));
@@ -156,8 +156,8 @@ impl Cloud {
         let reach = rounded(reach);
         let (lo, hi) = bounds(domain, x);
         let widest = (0..domain.dim).map(|a| hi[a] - lo[a]).fold(0.0, f64::max);
-        if widest > 0.0 && !LENGTHS.contains(&widest) {
-            return Err(Error::bad("x", format!("spread over {widest:e}"), LENGTHS_RULE));
+        if widest > 0.0 && !lengths(domain.dim).contains(&widest) {
+            return Err(Error::bad("x", format!("spread over {widest:e}"), &rule_of_lengths(domain.dim, OTHER_UNITS)));
         }
         let grid = Grid::new(domain, (lo, hi), reach, |axis| {
             let wrapped = (0..x.len()).map(|i| domain.wrap(axis, x.at(i, axis)));

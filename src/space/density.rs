@@ -18,7 +18,7 @@
 //! at right angles, so that edges and corners have it too.
 
 use super::facing::{Face, Faces};
-use super::{Cloud, LENGTHS, ONE_SIDED, Row, Scratch, rows::Rows};
+use super::{Cloud, ONE_SIDED, Row, Scratch, rows::Rows};
 use crate::error::{Error, Result};
 use crate::kernel::Kernel;
 use crate::memory;
@@ -360,7 +360,8 @@ pub fn guess(cloud: &Cloud, h_fac: f64, pool: &Pool) -> Result<Vec<f64>> {
         edge / ((last - first) as f64).powf(1.0 / dim as f64)
     };
     // Coordinates tell nothing shorter apart.
-    let least = |i: usize| cloud.x[..dim].iter().map(|x| f64::EPSILON * x[i].abs()).fold(*LENGTHS.start(), f64::max);
+    let shortest = *super::lengths(dim).start();
+    let least = |i: usize| cloud.x[..dim].iter().map(|x| f64::EPSILON * x[i].abs()).fold(shortest, f64::max);
     let mut h = memory::filled("h", cloud.len(), 0.0)?;
     pool.make(&mut h, |start, part| {
         for (k, h) in part.iter_mut().enumerate() {

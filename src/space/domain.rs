@@ -2,17 +2,26 @@
 
 use super::Axes;
 use crate::error::{Error, Result};
+use std::ops::RangeInclusive;
 
 /// Images of the box that a support may reach on each side. More would mean that each particle meets itself a dozen
 /// times: the resolution is wrong, not the search.
 pub const MAX_IMAGES: usize = 6;
 
-/// Lengths whose squares and volumes, and what is divided by them, are numbers.
-pub const LENGTHS: std::ops::RangeInclusive<f64> = 1e-100..=1e100;
-pub const LENGTHS_RULE: &str =
-    "lengths must lie between 1e-100 and 1e100, so that volumes are numbers: choose other units";
-const SUPPORTS_RULE: &str =
-    "lengths must lie between 1e-100 and 1e100, so that volumes are numbers: choose another h or h_fac, or other units";
+/// Lengths l in so many dimensions whose weights 1/l^(nu + 2), volumes, and products of two volumes, are numbers.
+pub fn lengths(dim: usize) -> RangeInclusive<f64> {
+    [1e-100..=1e100, 1e-75..=1e75, 1e-60..=1e50][dim - 1].clone()
+}
+
+/// As an error says it, with what helps.
+pub fn rule_of_lengths(dim: usize, remedy: &str) -> String {
+    let (least, most) = lengths(dim).into_inner();
+    format!(
+        "in {dim}-D lengths must lie between {least:e} and {most:e}, so that weights and volumes are numbers: {remedy}"
+    )
+}
+
+pub const OTHER_UNITS: &str = "choose other units";
 
 #[derive(Debug, Clone, PartialEq)]
 pub struct Domain {
@@ -31,7 +40,7 @@ impl Domain {
     /// A box that is periodic on some axes; on the others its bounds only have to be numbers.
     ///
     /// # Errors
-    /// `BadElement` for bounds that are not finite or a periodic axis whose length is none or not among [`LENGTHS`].
+    /// `BadElement` for bounds that are not finite or a periodic axis whose length is none or not among [`lengths`].
     pub fn new(lo: &[f64], hi: &[f64], periodic: &[bool]) -> Result<Domain> {
         let mut domain = Domain::open(lo.len());
         for axis in 0..lo.len() {
@@ -40,11 +49,13 @@ impl Domain {
                     return Err(Error::bad_at(name, axis, value, "the bounds of the box must be finite"));
                 }
             }
-            if periodic[axis] && (hi[axis] <= lo[axis] || !(hi[axis] - lo[axis]).is_finite()) {
+            if periodic[axis] && hi[axis] <= lo[axis] {
                 return Err(Error::bad_at("hi", axis, hi[axis], "a periodic box needs hi > lo"));
             }
-            if periodic[axis] && !LENGTHS.contains(&(hi[axis] - lo[axis])) {
-                return Err(Error::bad_at("hi", axis, hi[axis], LENGTHS_RULE));
+            if periodic[axis] && !lengths(lo.len()).contains(&(hi[axis] - lo[axis])) {
+                let ends = [("lo", lo[axis]), ("hi", hi[axis])];
+                let (name, value) = if lo[axis].abs() > hi[axis].abs() { ends[0] } else { ends[1] };
+                return Err(Error::bad_at(name, axis, value, &rule_of_lengths(lo.len(), OTHER_UNITS)));
             }
             (domain.lo[axis], domain.hi[axis], domain.periodic[axis]) = (lo[axis], hi[axis], periodic[axis]);
         }
@@ -74,10 +85,11 @@ impl Domain {
         image(from)..=image(to)
     }
 
-    /// Refuses a support that is not among [`LENGTHS`] or so large that it reaches more than [`MAX_IMAGES`] images.
+    /// Refuses a support that is not among [`lengths`] or so large that it reaches more than [`MAX_IMAGES`] images.
     pub fn check_reach(&self, reach: f64, index: usize) -> Result<()> {
-        if !LENGTHS.contains(&reach) {
-            return Err(Error::bad_at("h", index, format!("of a support of {reach:e}"), SUPPORTS_RULE));
+        if !lengths(self.dim).contains(&reach) {
+            let rule = rule_of_lengths(self.dim, "choose another h or h_fac, or other units");
+            return Err(Error::bad_at("h", index, format!("of a support of {reach:e}"), &rule));
         }
         for axis in (0..self.dim).filter(|&a| self.periodic[a]) {
             let length = self.length(axis);
@@ -117,6 +129,13 @@ mod tests {
             assert!(
                 Domain::new(&[0.0], &[length], &[true]).is_err() && Domain::new(&[0.0], &[length], &[false]).is_ok()
             );
+        }
+        assert!(Domain::new(&[-1.7e308], &[1.7e308], &[true]).unwrap_err().to_string().starts_with("hi[0] is 1.7"));
+        assert!(Domain::new(&[-1.7e308], &[1.0], &[true]).unwrap_err().to_string().starts_with("lo[0] is -1.7"));
+        for dim in 1..=3 {
+            let (least, most) = lengths(dim).into_inner();
+            let volume = most.powi(dim as i32);
+            assert!((volume * volume).is_finite() && least.powi(-(dim as i32) - 2).is_finite(), "{dim}");
         }
         assert!(d.check_reach(100.0, 7).unwrap_err().to_string().contains("particle 7"));
         assert!(Domain::new(&[0.0], &[0.0], &[true]).is_err() && Domain::new(&[f64::NAN], &[0.0], &[false]).is_err());

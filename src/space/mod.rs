@@ -15,7 +15,7 @@ mod scratch;
 pub mod surface;
 
 pub use cloud::Cloud;
-pub use domain::{Domain, LENGTHS, LENGTHS_RULE};
+pub use domain::{Domain, OTHER_UNITS, lengths, rule_of_lengths};
 pub use nearest::Nearest;
 pub use scratch::{ONE_SIDED, Row, Scratch};
 

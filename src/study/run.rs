@@ -158,7 +158,7 @@ impl Study {
 }
 
 /// From the solver's callback, which is told the time, to the share of the whole.
-fn told(start: f64, end: f64, mut watch: Watch) -> crate::plan::state::Progress {
+fn told(start: f64, end: f64, mut watch: Watch) -> crate::plan::report::Progress {
     Box::new(move |time, _| i32::from(!watch(((time - start) / (end - start)).clamp(0.0, 1.0))))
 }
 

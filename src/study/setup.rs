@@ -138,7 +138,7 @@ impl Setup<'_> {
         } else if its != before {
             self.remarks.push("the box is that of the file".into());
         }
-        self.remarks.extend(snapshot.told().into_iter().map(|remark| format!("the file: {remark}")));
+        self.remarks.extend(snapshot.told(|_| true).into_iter().map(|remark| format!("the file: {remark}")));
         let frame = self.solver.frame();
         self.remarks.extend(frame.about().map(|about| format!("the particles lie along {about}")));
         self.x = snapshot.points.iter().flat_map(|p| frame.inward(*p)).collect();
@@ -296,6 +296,10 @@ impl Setup<'_> {
             let known: Vec<&str> = fields().map(|f| f.name.as_str()).chain(exact).chain(laws).collect();
             if text.trim().parse::<f64>().is_ok() {
                 return Error::bad(name, format!("'{text}'"), "it is in quotes: write the number without them");
+            }
+            if text == "exact" {
+                let rule = "it starts from an exact solution: name one in [exact] ('list exact' shows them)";
+                return Error::bad(name, "'exact'", rule);
             }
             if known.is_empty() {
                 let rule = "a text names an array of the file, and the particles come from a lattice: give a number";

@@ -738,3 +738,39 @@ fn exchange_beyond_all_measure_is_done_or_refused_at_once() {
         }
     }
 }
+
+#[test]
+fn what_radiates_does_not_fall_below_absolute_zero() {
+    for words in ADAPTING.iter().chain(&["integrator=rkl2", "integrator=euler bounds=free"]) {
+        let mut s = exposed(words, &[("emissivity", 1e-3), ("source", -2e4)]);
+        let before = s.get_all("T").unwrap();
+        let error = s.step(0.1).unwrap_err();
+        assert!(error.to_string().contains("absolute temperatures"), "{words}: {error}");
+        assert_eq!(s.get_all("T").unwrap(), before, "{words}");
+        s.step(1e-3).unwrap();
+    }
+}
+
+/// However short the step.
+#[test]
+fn a_rate_that_is_no_number_names_the_particle() {
+    for words in ADAPTING.iter().chain(&["integrator=rkl2", "integrator=euler", "operator=limited"]) {
+        for (name, value) in [("source", 1.7e308), ("flux_in", 1.7e308), ("h_conv", 1e308)] {
+            for dt in [5e-324, 1e-300, 1.0] {
+                let mut s = exposed(words, &[]);
+                let mut values = vec![0.0; 125];
+                values[5] = value;
+                set(&mut s, name, &values);
+                // Capacities of 8e-3: 1.7e308 of them are no number.
+                s.set_number("c_v", 1e-3).unwrap();
+                match s.step(dt) {
+                    Err(e) => assert!(
+                        e.to_string().contains("particle 5") || e.to_string().contains("[5]"),
+                        "{words} {name} {dt:e}: {e}"
+                    ),
+                    Ok(report) => assert!(report.t_max.is_finite(), "{words} {name} {dt:e}"),
+                }
+            }
+        }
+    }
+}

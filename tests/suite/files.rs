@@ -78,7 +78,10 @@ fn what_a_solver_needs_and_cannot_use_is_refused() {
     let vector = array("Float64", "m", "NumberOfComponents=\"3\"", &"0 0 1 ".repeat(4));
     let odd = array("Float64", "p", "NumberOfComponents=\"3\"", "1 2 3 4");
     let told = solver.read_vtk(folder.write("b.vtu", square("", &(vector + &odd + &temperature())))).unwrap();
-    assert!(told.len() == 1 && told[0].contains("'p' is left aside"), "{told:?}");
+    assert!(told.len() == 2 && told[0].contains("'p' is left aside") && told[1].contains("not 3"), "{told:?}");
+    let other = array("Float64", "temperature", "", "1 2 3 4");
+    let told = solver.read_vtk(folder.write("c.vtu", square("", &(other + &temperature())))).unwrap();
+    assert!(told.len() == 1 && told[0].contains("'temperature' is left aside"), "{told:?}");
     assert_eq!(solver.get_all("T").unwrap(), [1.0, 2.0, 3.0, 4.0]);
     assert!(solver.get_all("m").is_err());
 }

@@ -204,7 +204,7 @@ fn threads_do_not_change_a_bit_and_the_plan_says_what_runs() {
             let limit = s.limit().unwrap();
             s.step(300.0 * limit).unwrap();
             let plan = s.plan().unwrap();
-            let has = |name: &str| plan.passes.iter().any(|line| line.pass.name == name);
+            let has = |name: &str| plan.passes.iter().any(|line| line.pass.name.0 == name);
             assert!(has("solve") && !has("bound") && !has("stages"), "{plan}");
             bits(&s.get_all("T").unwrap())
         };

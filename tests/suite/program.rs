@@ -440,6 +440,17 @@ mod unix {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
+    /// By default the signal that comes with such a write ends a process.
+    #[test]
+    fn a_limit_on_the_size_of_files_is_an_error_of_the_write() {
+        let folder = tempfile::tempdir().unwrap();
+        let mut shell = Command::new("sh");
+        shell.args(["-c", "ulimit -f 8 && exec \"$0\" run"]).arg(program().get_program()).current_dir(folder.path());
+        let answer = ask(&mut shell);
+        assert_eq!(answer.code, Some(1), "{}", answer.err);
+        assert!(answer.err.contains("too large"), "{}", answer.err);
+    }
+
     /// A run that takes minutes.
     fn long(folder: &TempDir) -> Command {
         let text = std::fs::read_to_string(scene("dam_break")).unwrap();

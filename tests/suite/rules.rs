@@ -176,13 +176,13 @@ fn the_plan_is_the_program() {
         for without in ["".into(), format!(" without={}", scene.rule.name)] {
             let mut s = run(scene, &without).solver;
             let (plan, case) = (s.plan().unwrap(), format!("{}{without}", scene.words));
-            let listed = |name: &str| plan.passes.iter().any(|line| line.pass.name == name);
+            let listed = |name: &str| plan.passes.iter().any(|line| line.pass.name.0 == name);
             for (name, _) in s.spent().0 {
                 assert!(listed(name), "{case}: {name} has run\n{plan}");
             }
             let stored = !plan.leaves_out(&rules::USED_ONCE);
             for pass in plan.passes.iter().map(|line| line.pass).filter(|pass| pass.make.is_some() && stored) {
-                assert!(s.runs(pass.name) > 0, "{case}: {} has not run\n{plan}", pass.name);
+                assert!(s.runs(pass.name.0) > 0, "{case}: {} has not run\n{plan}", pass.name.0);
             }
         }
     }

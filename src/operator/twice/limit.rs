@@ -36,7 +36,7 @@ impl Twice {
                 room = [room[0] + may.max(0.0), room[1] + may.min(0.0)];
             }
             [0, 1].map(|k| if wanted[k] != 0.0 { (room[k] / wanted[k]).min(1.0) } else { 1.0 })
-        });
+        })?;
         self.each(pool, out, |a| {
             let pairs = self.row(matrix, kappa, a).map(|e| {
                 let (low, all) = (low(&e), exchange(&e));
@@ -44,7 +44,7 @@ impl Twice {
                 low + (all - low) * shares[e.a][up].min(shares[e.b][1 - up])
             });
             finish(a, pairs.sum())
-        });
+        })?;
         Ok(())
     }
 }

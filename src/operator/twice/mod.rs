@@ -129,10 +129,7 @@ impl Twice {
         };
         match &self.low {
             Some(_) => self.limited(pool, (matrix, kappa), t, exchange, out, finish),
-            None => {
-                self.each(pool, out, |a| finish(a, self.row(matrix, kappa, a).map(|e| exchange(&e)).sum()));
-                Ok(())
-            }
+            None => self.each(pool, out, |a| finish(a, self.row(matrix, kappa, a).map(|e| exchange(&e)).sum())),
         }
     }
 
@@ -153,7 +150,7 @@ impl Twice {
                     .map(|e| e.mean_kappa * (e.low + ROOM * e.coef))
                     .sum();
                 (sum, sum)
-            });
+            })?;
             return Ok(out);
         }
         let own_kappa = |a: usize| kappa.map_or(1.0, |(_, k)| k[a]);
@@ -163,19 +160,19 @@ impl Twice {
         self.each(pool, &mut g, |a| {
             let raw: f64 = self.row(matrix, kappa, a).map(|e| e.slope.own * length(e.slope.d)).sum();
             2.0 * self.frame[a].norm() * raw
-        });
+        })?;
         let jump = |e: &Exchange| self.omega(e).abs() * (2.0 + 0.5 * (g[e.a] + g[e.b]) * length(e.slope.d));
         let mut z = memory::filled("fluxes", n, 0.0)?;
         self.each(pool, &mut z, |a| {
             let jumps: f64 = self.row(matrix, kappa, a).map(|e| 0.5 * jump(&e) * length(e.slope.d)).sum();
             self.frame[a].norm() * (self.volume[a] * own_kappa(a) * tensor::trace(&self.shape[a]) * g[a] + jumps)
-        });
+        })?;
         self.each(pool, &mut out, |a| {
             let all = |e: &Exchange| length(e.slope.d) * (z[e.a] * e.slope.own + z[e.b] * e.slope.mate) + jump(e);
             let bound: f64 = self.row(matrix, kappa, a).map(|e| all(&e)).sum();
             let diagonal = self.diagonal(matrix, kappa, a);
             ((bound - diagonal).max(0.0), diagonal)
-        });
+        })?;
         Ok(out)
     }
 
@@ -203,7 +200,7 @@ impl Twice {
                 (0..3).for_each(|k| raw[k] += rise * e.slope.d[k]);
             }
             times(&self.frame[a], raw)
-        });
+        })?;
         Ok(g)
     }
 
@@ -219,7 +216,7 @@ impl Twice {
                 }
             }
             transposed(&self.frame[a], q)
-        });
+        })?;
         Ok(z)
     }
 
@@ -248,8 +245,8 @@ impl Twice {
         })
     }
 
-    fn each<T: Send>(&self, pool: &Pool, out: &mut [T], f: impl Fn(usize) -> T + Sync + Send) {
-        pool.chunks(out, BLOCK, |start, part| part.iter_mut().enumerate().for_each(|(k, out)| *out = f(start + k)));
+    fn each<T: Send>(&self, pool: &Pool, out: &mut [T], f: impl Fn(usize) -> T + Sync + Send) -> Result<()> {
+        pool.make(out, |start, part| part.iter_mut().enumerate().for_each(|(k, out)| *out = f(start + k)))
     }
 }
 
