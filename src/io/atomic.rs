@@ -145,9 +145,12 @@ const TAIL: &str = ".tmp";
 impl Temporary {
     /// Another name of a file that is there.
     fn link(path: &Path) -> io::Result<Temporary> {
-        let temporary = Temporary::create(folder_of(path))?;
+        let mut temporary = Temporary::create(folder_of(path))?;
         std::fs::remove_file(&temporary.path)?;
         std::fs::hard_link(path, &temporary.path)?;
+        // Or whoever removes stale files would take it.
+        temporary.file = File::open(&temporary.path)?;
+        temporary.file.try_lock_shared().map_err(io::Error::from)?;
         Ok(temporary)
     }
 

@@ -196,7 +196,9 @@ pub fn recommend(solver: &mut Solver, wanted: f64, dt: f64) -> Result<Recommenda
         }
     }
     solver.begin();
-    solver.ready("recommend")?;
+    if let Err(missing @ Error::OutOfOrder { .. }) = solver.ready("recommend") {
+        return Err(missing);
+    }
     solver.tell(0.0)?;
     let reference = Reference::of(solver, dt, (EXACT_IN_TIME * wanted).clamp(1e-9, 1e-4))?;
     let (free, all) = (free(solver)?, choices(solver)?);
