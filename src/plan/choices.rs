@@ -27,7 +27,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "allow",
-        "what is refused otherwise, by commas: unstable, an operator with modes that may grow (a step in which T grows is refused all the same); energy, consistent weights that make or lose more than 1 %; volumes, m/rho far from what distances say (K_d2); flat, particles that fill fewer dimensions than dim",
+        "what is refused otherwise, by commas: unstable, modes that may grow (a step in which T grows still is); energy, consistent weights that make or lose over 1 %; volumes, m/rho far from distances (K_d2); flat, particles of fewer dimensions than dim",
     ),
     (
         "normalise",
