@@ -48,7 +48,7 @@ impl Equations<'_> {
             }
             let before = length;
             self.precondition(r, q)?;
-            length = sum::sum(pool, n, |i| weight[i] * (unit * r[i]) * (unit * q[i]));
+            length = product(pool, unit, [weight, r, q]);
             let again = length / before;
             pool.update(p, |start, part| {
                 part.iter_mut().enumerate().for_each(|(k, p)| *p = q[start + k] + again * *p);
@@ -57,7 +57,7 @@ impl Equations<'_> {
             pool.update(q, |start, part| {
                 part.iter_mut().zip(&p[start..]).for_each(|(q, p)| *q = p - g * *q);
             });
-            let curvature = sum::sum(pool, n, |i| weight[i] * (unit * p[i]) * (unit * q[i]));
+            let curvature = product(pool, unit, [weight, p, q]);
             let step = length / curvature;
             // Also where nothing is left but underflow, or an overflow: a step that is no number helps nobody.
             if !(curvature > 0.0 && step.is_finite()) {
@@ -100,10 +100,22 @@ impl Equations<'_> {
     }
 }
 
-/// A power of two that makes numbers of this size about one, so that their squares are numbers, and their digits stay.
+/// Sizes whose squares, times any weight that is likely, are numbers.
+const PLAIN: std::ops::RangeInclusive<f64> = 1e-60..=1e60;
+
+/// What numbers of this size are multiplied by so that their squares are numbers: 1, or a power of two, so that their
+/// digits stay.
 fn unit_of(size: f64) -> f64 {
     let unit = (-size.log2().round()).exp2();
-    if unit.is_normal() { unit } else { 1.0 }
+    if unit.is_normal() && !PLAIN.contains(&size) { unit } else { 1.0 }
+}
+
+/// Σ w x y in this unit of x and y.
+fn product(pool: &Pool, unit: f64, [w, x, y]: [&[f64]; 3]) -> f64 {
+    match unit {
+        1.0 => sum::sum(pool, w.len(), |i| w[i] * x[i] * y[i]),
+        unit => sum::sum(pool, w.len(), |i| w[i] * (unit * x[i]) * (unit * y[i])),
+    }
 }
 
 /// `to += factor * what`.
