@@ -7,7 +7,7 @@ use crate::integrator::Bounds;
 pub struct Known {
     /// Gershgorin's: what every step finds first, whatever steps were before it.
     pub proven: Bounds,
-    /// The same, lowered by power iteration, where that was needed.
+    /// The same, lowered by iterations, where that was needed.
     pub refined: Option<Bounds>,
     /// No bound on the spectrum can be less.
     pub floor: f64,

@@ -154,6 +154,12 @@ impl Motion<'_> {
                 self.choices.method.advance(&schedule, &mut self.heat, self.pool, now, t, self.work)?;
                 report.substeps += 1;
                 report.came_in(1.0, self.work.tally);
+                // Later it would be seen at all neighbours.
+                if report.substeps == 1
+                    && let Some(i) = sum::first(self.pool, t.len(), |i| !t[i].is_finite())
+                {
+                    return Err(Error::NotFinite { what: "T".into(), index: self.heat.host[i] as usize, value: t[i] });
+                }
                 self.tell(time, dt, done + schedule.start(k + 1))?;
             }
             done = if steps == schedule.substeps { dt } else { done + schedule.start(steps) };
@@ -313,7 +319,7 @@ impl Motion<'_> {
         Ok(bounds)
     }
 
-    /// The best bounds there are: Gershgorin's, lowered by power iteration.
+    /// The best bounds there are: Gershgorin's, lowered by Lanczos' method.
     pub fn refined_bounds(&mut self, time: f64, t: &[f64]) -> Result<Bounds> {
         let known = self.known_or_proven(time, t)?;
         let bounds = self.refined(known, time, t)?;
@@ -413,13 +419,15 @@ impl Motion<'_> {
         }
     }
 
-    /// The same, lowered by power iteration. Exchange with the surroundings is linearised.
+    /// The same, lowered by an estimate from iterations. Exchange with the surroundings is linearised.
     fn refine(&mut self, Known { proven, floor, .. }: Known, time: f64, t: &[f64]) -> Result<Bounds> {
         if proven.spectral == 0.0 {
             return Ok(proven);
         }
         let weight = self.linearise_about(time, t)?;
-        let spectral = spectrum::largest(self.pool, &weight, proven.spectral, |x, y| self.heat.linear(x, y))?;
+        let symmetric = self.choices.operator.conserves && self.heat.engine.is_linear();
+        let spectral =
+            spectrum::largest(self.pool, &weight, proven.spectral, symmetric, |x, y| self.heat.linear(x, y))?;
         Ok(Bounds { spectral: spectral.max(floor), ..proven })
     }
 

@@ -208,7 +208,7 @@ table! {
     BOUND = Pass {
         name: Name("bound"),
         when: |s| (CIRCLES.when)(s).filter(|_| !s.facts.implicit),
-        about: |_| "power iteration, where it saves stages".into(),
+        about: |_| "Lanczos' method, where it saves stages".into(),
         cost: |s| s.cost([0.0; 2], 1.0),
         make: None,
     };

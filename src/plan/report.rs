@@ -11,7 +11,7 @@ pub struct Report {
     pub substeps: u64,
     /// Stages of the last sub-step.
     pub stages: u64,
-    /// Applications of the operator, those of the power iteration and of solvers included.
+    /// Applications of the operator, those of bounds and of solvers included.
     pub applications: u64,
     /// A stable explicit step, s, from the bounds that the step needed; `limit` finds the largest. After an implicit step
     /// what Gershgorin's circles prove, which is less.

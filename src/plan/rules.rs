@@ -98,7 +98,7 @@ table! {
     };
     PROVEN_BOUND = Rule {
         name: "proven_bound",
-        reason: "where Gershgorin's bound asks for the same sub-steps as any lower one could, no power iteration",
+        reason: "where Gershgorin's bound asks for the same sub-steps as any lower one could, no search for it",
         same: Same::Bits,
         holds: |f| !f.implicit,
     };

@@ -151,7 +151,7 @@ impl State {
         Ok(rate)
     }
 
-    /// Bounds on the operator now, refined by power iteration.
+    /// Bounds on the operator now, refined by iterations.
     pub fn bounds(&mut self) -> Result<Bounds> {
         let plan = self.prepare("limit")?;
         let (t, time) = (self.each(fields::T)?, self.time);

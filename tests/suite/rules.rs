@@ -86,7 +86,7 @@ const SCENES: &[Scene] = &[
     scene(&rules::NO_SOURCE, "kernel=M4", &[5.0], Inside),
     Scene { set: hot_corner, ..scene(&rules::QUIET_ROWS, "kernel=M4 integrator=ssprk3", &[2.0, 3.0], Inside) },
     scene(&rules::ONE_STAGE, "kernel=M4 integrator=rkl1 tolerance=off", &[0.01], Applications(2)),
-    // Power iteration takes 16 applications at least.
+    // The search for a lower bound takes 16 applications at least.
     scene(&rules::PROVEN_BOUND, "kernel=M4 integrator=euler", &[0.1, 0.1], Applications(16)),
     scene(&rules::PROVEN_BOUND, "kernel=M4 integrator=rkl2", &[0.1, 0.1], Applications(16)),
     Scene {
