@@ -432,7 +432,8 @@ int32_t diffusph_set_kappa_callback(struct diffusph_solver *s, diffusph_field_ca
 /**
  * Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away, and so does
  * setting "source". It is called for every stage, with `user`. What changes faster than a step is followed where sub-steps
- * are (by integrator=auto, the default, and wherever tolerance= is given); other methods know only what a stage saw.
+ * are (by integrator=auto, the default, and wherever tolerance= is given), unless it is a pulse that no stage sees; other
+ * methods know only what a stage saw.
  */
 int32_t diffusph_set_source_callback(struct diffusph_solver *s,
                                      diffusph_field_callback callback,

@@ -58,7 +58,8 @@ pub unsafe extern "C" fn diffusph_set_kappa_callback(
 
 /// Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away, and so does
 /// setting "source". It is called for every stage, with `user`. What changes faster than a step is followed where sub-steps
-/// are (by integrator=auto, the default, and wherever tolerance= is given); other methods know only what a stage saw.
+/// are (by integrator=auto, the default, and wherever tolerance= is given), unless it is a pulse that no stage sees; other
+/// methods know only what a stage saw.
 ///
 /// # Safety
 /// As diffusph_set_kappa_callback.
