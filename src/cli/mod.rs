@@ -12,7 +12,6 @@ mod study;
 use crate::error::{Error, Result};
 use crate::study::run::Study;
 use crate::study::scene::Scene;
-use crate::words::Words;
 use clap::error::ContextKind;
 use clap::{Args, Parser, Subcommand};
 use std::io::Write;
@@ -82,12 +81,7 @@ impl SceneArgs {
             Some(path) => Scene::read(path)?,
             None => Scene::parse("the default scene", DEFAULT_SCENE)?,
         };
-        // Words given twice are refused as those of one line.
-        let words = self.set.join(" ");
-        Words::parse("--set", &words)?;
-        for word in words.split_whitespace() {
-            scene.set_word(word)?;
-        }
+        scene.set_words(&self.set.join(" "))?;
         let folder = self.scene.as_deref().and_then(Path::parent);
         Study::new(scene, folder.unwrap_or(Path::new("")))
     }

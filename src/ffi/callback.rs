@@ -57,9 +57,9 @@ pub unsafe extern "C" fn diffusph_set_kappa_callback(
 }
 
 /// Heat released per volume as a function of the host, in place of the field "source"; NULL takes it away, and so does
-/// setting "source". It is called for every stage, with `user`. What changes faster than a step is followed where sub-steps
-/// are (by integrator=auto, the default, and wherever tolerance= is given), unless it is a pulse that no stage sees; other
-/// methods know only what a stage saw.
+/// setting "source". It is called for every stage, with `user`, and at `looks=8` times of each step besides: where it changes
+/// between stages, sub-steps are taken so short that it is followed. What is on for less than an eighth of a step may be
+/// missed: take shorter steps, or more looks.
 ///
 /// # Safety
 /// As diffusph_set_kappa_callback.

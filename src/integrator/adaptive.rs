@@ -47,6 +47,8 @@ pub struct Control {
     pub tolerance: Option<f64>,
     /// What no sub-step may leave.
     pub range: Range,
+    /// What is known beforehand of how far y will move, as root mean square: it counts as y's spread does.
+    pub raises: f64,
 }
 
 /// One step in sub-steps that may be rejected.
@@ -92,8 +94,8 @@ impl<'a> Adaptive<'a> {
         system.rate(t, y, &mut rate)?;
         // What rounding makes of equal values is no spread.
         let size = sum::max(pool, y.len(), |i| y[i].abs());
-        let spread =
-            Some(sum::spread(pool, y.len(), |i| weight[i], |i| y[i])).filter(|s| *s > ROUNDING * size).unwrap_or(0.0);
+        let spread = sum::spread(pool, y.len(), |i| weight[i], |i| y[i]);
+        let spread = control.raises.max(if spread > ROUNDING * size { spread } else { 0.0 });
         let speed = sum::rms(pool, y.len(), |i| weight[i], |i| rate[i]);
         let guess = control.tolerance.map_or(dt, |tolerance| tolerance.powf(control.exponent()) * (spread / speed));
         let length = if guess > 0.0 { guess.max(SHORTEST * dt).min(dt) } else { dt };
@@ -124,14 +126,9 @@ impl<'a> Adaptive<'a> {
         rest / ((1.0 - 1e-9) * (rest / self.length.min(failed).min(most))).ceil().max(1.0)
     }
 
-    /// Whether y changes at all: with a rate of 0 everywhere it stays as it is, however long the step.
-    pub fn is_still(&self) -> bool {
-        sum::max(self.pool, self.rate.len(), |i| self.rate[i].abs()) <= 0.0
-    }
-
-    /// A rate at the beginning that is no number, with its place: no sub-step is short enough.
-    pub fn first_bad_rate(&self) -> Option<(usize, f64)> {
-        sum::first(self.pool, self.rate.len(), |i| !self.rate[i].is_finite()).map(|i| (i, self.rate[i]))
+    /// The rate at the beginning.
+    pub fn rate(&self) -> &[f64] {
+        &self.rate
     }
 
     /// How far y has come from its beginning, root mean square.

@@ -31,7 +31,7 @@ fn run(method: &'static Method, tolerance: f64, start: f64) -> (f64, u32, u64) {
     let (pool, mut work, mut y, mut system) = (Pool::new(1).unwrap(), Work::default(), [start, 1.0], Pair([0.0; 2]));
     let bounds = if method.is_implicit() { Bounds { spectral: 0.0, diagonal: 0.0 } } else { BOUNDS };
     let weight = [1.0; 2];
-    let control = Control { method, tolerance: Some(tolerance), range: Range::FINITE };
+    let control = Control { method, tolerance: Some(tolerance), range: Range::FINITE, raises: 0.0 };
     let mut pace = Adaptive::new(control, &pool, &weight, &mut system, (0.0, 2.0), &y).unwrap();
     let (mut t, mut accepted) = (0.0, 0);
     while t < 2.0 {
@@ -77,7 +77,7 @@ fn a_constant_is_one_step_and_a_failure_is_passed_on() {
     let (pool, weight) = (Pool::new(1).unwrap(), [1.0; 3]);
     for method in METHODS {
         let (mut y, mut system, mut work) = ([1.0, 2.0, 4.0], Still(None), Work::default());
-        let control = Control { method, tolerance: Some(1e-6), range: Range::FINITE };
+        let control = Control { method, tolerance: Some(1e-6), range: Range::FINITE, raises: 0.0 };
         let mut pace = Adaptive::new(control, &pool, &weight, &mut system, (0.0, 7.0), &y).unwrap();
         assert_eq!(pace.next(7.0, f64::INFINITY), 7.0);
         let schedule = Schedule { substeps: 1, stages: 5, dt: 7.0, total: 7.0, limits: Limits::default() };

@@ -40,12 +40,13 @@ impl Equations<'_> {
         let (Shifted { g, weight, .. }, pool, n) = (self.shifted, self.pool, r.len());
         p.fill(0.0);
         let (mut length, mut residual, mut done) = (f64::INFINITY, f64::INFINITY, most);
-        let unit = unit_of(sum::max(pool, n, |i| r[i].abs()));
+        let mut unit = None;
         for iteration in 0..=most {
             residual = sum::max(pool, n, |i| r[i].abs());
             if residual <= target {
                 return Ok(iteration);
             }
+            let unit = *unit.get_or_insert_with(|| unit_of(residual));
             let before = length;
             self.precondition(r, q)?;
             length = product(pool, unit, [weight, r, q]);

@@ -145,33 +145,37 @@ const TAIL: &str = ".tmp";
 impl Temporary {
     /// Another name of a file that is there.
     fn link(path: &Path) -> io::Result<Temporary> {
-        let mut temporary = Temporary::create(folder_of(path))?;
-        std::fs::remove_file(&temporary.path)?;
-        std::fs::hard_link(path, &temporary.path)?;
         // Or whoever removes stale files would take it.
-        temporary.file = File::open(&temporary.path)?;
-        temporary.file.try_lock_shared().map_err(io::Error::from)?;
-        Ok(temporary)
+        let file = File::open(path)?;
+        file.try_lock_shared().map_err(io::Error::from)?;
+        let (path, ()) = with_free_name(folder_of(path), |name| std::fs::hard_link(path, name))?;
+        Ok(Temporary { path, file })
     }
 
     fn create(folder: &Path) -> io::Result<Temporary> {
-        static COUNT: AtomicU64 = AtomicU64::new(0);
         remove_stale(folder);
         loop {
-            let number = COUNT.fetch_add(1, Ordering::Relaxed);
-            let path = folder.join(format!("{HEAD}{}.{number}{TAIL}", std::process::id()));
-            match OpenOptions::new().write(true).create_new(true).open(&path) {
-                Ok(file) => {
-                    // Whoever removes stale files may have found it before it was locked. Without locks there is no such.
-                    let lost = matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !path.exists();
-                    if !lost {
-                        return Ok(Temporary { path, file });
-                    }
-                }
-                // Left by a killed process that had our number, or another host's on a shared disk: take the next.
-                Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
-                Err(e) => return Err(e),
+            let open = |name: &Path| OpenOptions::new().write(true).create_new(true).open(name);
+            let (path, file) = with_free_name(folder, open)?;
+            // Whoever removes stale files may have found it before it was locked. Without locks there is no such.
+            let lost = matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !path.exists();
+            if !lost {
+                return Ok(Temporary { path, file });
             }
+        }
+    }
+}
+
+/// What `make` makes of the first name of an unfinished file that nothing has yet, and the name.
+fn with_free_name<T>(folder: &Path, make: impl Fn(&Path) -> io::Result<T>) -> io::Result<(PathBuf, T)> {
+    static COUNT: AtomicU64 = AtomicU64::new(0);
+    loop {
+        let number = COUNT.fetch_add(1, Ordering::Relaxed);
+        let path = folder.join(format!("{HEAD}{}.{number}{TAIL}", std::process::id()));
+        match make(&path) {
+            // Left by a killed process that had our number, or another host's on a shared disk: take the next.
+            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
+            made => return made.map(|made| (path, made)),
         }
     }
 }

@@ -46,8 +46,8 @@ pub struct Field {
 pub enum Access {
     /// Set by the host (and readable); holds its default until then, if it has one.
     Input { domain: Domain, default: Option<f64> },
-    /// Computed when asked for.
-    Output,
+    /// Computed when asked for; where it is settable, that sets what it is made from.
+    Output { settable: bool },
 }
 
 const fn input(
@@ -61,7 +61,11 @@ const fn input(
 }
 
 const fn output(name: &'static str, unit: &'static str, about: &'static str) -> Field {
-    Field { name, unit, about, vector: false, access: Access::Output }
+    Field { name, unit, about, vector: false, access: Access::Output { settable: false } }
+}
+
+const fn settable(field: Field) -> Field {
+    Field { access: Access::Output { settable: true }, ..field }
 }
 
 const fn vector(field: Field) -> Field {
@@ -109,8 +113,8 @@ pub static FIELDS: &[Field] = &[
     input("kappa_xy", "W/(m K)", Finite, None, "its component xy"),
     input("kappa_yz", "W/(m K)", Finite, None, "its component yz"),
     input("kappa_xz", "W/(m K)", Finite, None, "its component xz"),
-    vector(output("x", "m", "position, inside the box on periodic axes")),
-    output("u", "J/kg", "energy per mass, c_v T; setting it sets T"),
+    settable(vector(output("x", "m", "position, inside the box on periodic axes"))),
+    settable(output("u", "J/kg", "energy per mass, c_v T; setting it sets T")),
     output("rate", "W/kg", "du/dt from diffusion, surface and source"),
     output("dT_dt", "K/s", "dT/dt; 0 where T is fixed"),
     output("K_d2", "-", "second moment of the operator before normalisation (1 for a perfect Laplacian)"),
@@ -133,7 +137,7 @@ pub static FIELDS: &[Field] = &[
         "W/m^2",
         "heat flux -kappa grad T, with kappa averaged as between particles: the same on both sides of a jump",
     )),
-    vector(output("b", "-", "b_x, b_y, b_z as one vector; setting it sets them")),
+    settable(vector(output("b", "-", "b_x, b_y, b_z as one vector; setting it sets them"))),
 ];
 
 /// Position of an input in [`FIELDS`] and in a solver's storage.

@@ -327,13 +327,23 @@ fn source_of(
     pool: &Pool,
 ) -> Result<()> {
     called("source", host(time, particles, t, source))?;
-    match sum::first(pool, t.len(), |i| !source[i].is_finite()) {
+    // Not an error that a shorter sub-step may mend: asked again, it could hide.
+    refuse_what_is_not_finite(pool, particles, source, |i| format!("the source callback's value at T = {}", t[i]))
+}
+
+/// Refuses values of which one is no number, naming its particle; `what` says of which value it is.
+///
+/// # Errors
+/// `NotFinite`.
+pub fn refuse_what_is_not_finite(
+    pool: &Pool,
+    particles: &[u32],
+    values: &[f64],
+    what: impl Fn(usize) -> String,
+) -> Result<()> {
+    match sum::first(pool, values.len(), |i| !values[i].is_finite()) {
         None => Ok(()),
-        Some(i) => {
-            // Not an error that a shorter sub-step may mend: asked again, it could hide.
-            let what = format!("the source callback's value at T = {}", t[i]);
-            Err(Error::NotFinite { what, index: particles[i] as usize, value: source[i] })
-        }
+        Some(i) => Err(Error::NotFinite { what: what(i), index: particles[i] as usize, value: values[i] }),
     }
 }
 

@@ -146,15 +146,32 @@ impl Surface {
 
     /// The bounds of what T may become that starts between these: the surroundings of what exchanges with them are in
     /// between as well, and nothing bounds the side on which a flux is given.
-    pub fn reached(&self, mut low: f64, mut high: f64) -> (f64, f64) {
+    pub fn reached(&self, low: f64, high: f64) -> (f64, f64) {
+        let (mut low, mut high) = self.with_surroundings(low, high);
         for (_, e) in self.members.iter().filter(|(_, e)| e.area > 0.0) {
-            if e.h_conv > 0.0 || (e.emissivity > 0.0 && self.sigma_sb > 0.0) {
-                (low, high) = (low.min(e.t_ambient), high.max(e.t_ambient));
-            }
             low = if e.flux_in < 0.0 { f64::MIN } else { low };
             high = if e.flux_in > 0.0 { f64::MAX } else { high };
         }
         (low, high)
+    }
+
+    /// The same bounds with the temperatures of the surroundings between them.
+    pub fn with_surroundings(&self, mut low: f64, mut high: f64) -> (f64, f64) {
+        for (_, e) in self.members.iter().filter(|(_, e)| e.area > 0.0) {
+            if e.h_conv > 0.0 || (e.emissivity > 0.0 && self.sigma_sb > 0.0) {
+                (low, high) = (low.min(e.t_ambient), high.max(e.t_ambient));
+            }
+        }
+        (low, high)
+    }
+
+    /// The same surface for temperatures that are counted from `origin`, where it is linear.
+    ///
+    /// # Errors
+    /// `NoMemory`.
+    pub fn counted_from(&self, origin: f64) -> Result<Surface> {
+        let moved = |&(m, e): &(Member, Exchange)| (m, Exchange { t_ambient: e.t_ambient - origin, ..e });
+        Ok(Surface { members: memory::collected("surface", self.members.iter().map(moved))?, ..*self })
     }
 
     /// rate_i += power_i / capacity_i; `inverse` holds 1/capacity, `kappa` kappa(T) where it depends on T. Answers the

@@ -44,11 +44,10 @@ fn lanczos(
 ) -> Result<f64> {
     let n = weight.len();
     let array = || memory::filled("Lanczos' method", n, 0.0);
-    let (mut x, mut y, mut before) = (array()?, array()?, array()?);
+    let (mut x, mut y, mut before) = (start(weight)?, array()?, array()?);
     // In units in which nothing over- or underflows.
     let most = sum::max(pool, n, |i| weight[i]);
     let product = |x: &[f64], y: &[f64]| sum::sum(pool, n, |i| (weight[i] / most) * x[i] * y[i]);
-    x.iter_mut().enumerate().filter(|(i, _)| weight[*i] > 0.0).for_each(|(i, x)| *x = start(i));
     let length = product(&x, &x).sqrt();
     if !(length > 0.0 && length.is_finite()) {
         return Ok(0.0);
@@ -130,7 +129,7 @@ pub fn estimate(
     mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
 ) -> Result<f64> {
     let n = weight.len();
-    let mut x = memory::collected("power iteration", (0..n).map(|i| if weight[i] > 0.0 { start(i) } else { 0.0 }))?;
+    let mut x = start(weight)?;
     let mut y = memory::filled("power iteration", n, 0.0)?;
     let norm = |v: &[f64]| {
         let largest = sum::max(pool, n, |i| v[i].abs());
@@ -154,11 +153,18 @@ pub fn estimate(
     Ok(estimate)
 }
 
-/// A start vector that is rich in the fastest modes and the same on every machine: signs and sizes from a hash.
-pub(super) fn start(i: usize) -> f64 {
-    let mixed = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
-    let bits = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11;
-    bits as f64 / (1u64 << 52) as f64 - 1.0
+/// A start vector that is rich in the fastest modes and the same on every machine: signs and sizes from a hash; 0 for what
+/// does not take part.
+///
+/// # Errors
+/// `NoMemory`.
+pub(super) fn start(weight: &[f64]) -> Result<Vec<f64>> {
+    let hashed = |i: usize| {
+        let mixed = (i as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let bits = (mixed ^ (mixed >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 11;
+        bits as f64 / (1u64 << 52) as f64 - 1.0
+    };
+    memory::collected("Krylov space", weight.iter().enumerate().map(|(i, &w)| if w > 0.0 { hashed(i) } else { 0.0 }))
 }
 
 #[cfg(test)]

@@ -27,7 +27,7 @@ pub static WORDS: &[(&str, &str)] = &[
     ),
     (
         "allow",
-        "what is refused otherwise, by commas: unstable, modes that may grow (a step in which T grows still is); energy, consistent weights that make or lose over 1 %; volumes, m/rho far from distances (K_d2); flat, particles of fewer dimensions than dim",
+        "what is refused otherwise, by commas: unstable, modes that may grow (T that grows in a step still is); energy, consistent weights that make over 1 %; volumes, far from distances (K_d2) or with neighbours out of reach; flat, particles of fewer dimensions",
     ),
     (
         "normalise",
@@ -54,7 +54,11 @@ pub static WORDS: &[(&str, &str)] = &[
     ("max_applications", "most applications of the operator in one step (default 10000000)"),
     (
         "tolerance",
-        "most rms error of a sub-step over the spread of T; off: dt, stability or change= decide (default off; auto, rkl1, rkl2 1e-3). They add up: over a decay to 0.1 to 3 times this, by euler, rkl1, backward-euler to 300 times",
+        "most rms error of a sub-step over the spread of T, or how far T has come; off: dt, stability or change= decide (default off; auto, rkl1, rkl2 1e-3). They add up: over a decay to 0.1 to 3 times this, by euler, rkl1, backward-euler to 300 times",
+    ),
+    (
+        "looks",
+        "how often a host's source and kappa functions are looked at in a step besides stages, so that no pulse is missed; 0: never (default 8)",
     ),
     (
         "solver_tolerance",
@@ -78,6 +82,9 @@ const CHANGE: f64 = 0.05;
 /// Default of `max_stages` where errors are estimated. Hot discs and modes on 24² particles, one step of 1e4 limits: 950 and
 /// 870 applications instead of 1750 and 1700 with at most 31 stages, errors below the tolerance of 1e-3.
 const CONTROLLED_STAGES: u32 = 999;
+
+/// Default of `looks`.
+const LOOKS: u32 = 8;
 
 /// Default of `theta`. 20 % jitter, kappa_perp = 0, M4, M6 and C4 alike to a tenth, three seeds, b at 0 and 30 degrees: error of
 /// a decaying mode on 32² particles 1.2 at 0, 0.28 at 0.1, 0.17 at 0.3, 0.10 at 1, 0.07 at 3, leakage across b 1e-5, 4e-5,
@@ -143,6 +150,8 @@ pub struct Choices {
     /// Most error of a sub-step, relative to the spread of T; none: sub-steps are not controlled.
     pub tolerance: Option<f64>,
     pub preconditioner: Preconditioner,
+    /// How often in a step the host's functions are looked at besides stages.
+    pub looks: u32,
     pub threads: usize,
     pub memory: Option<u64>,
     without: Vec<&'static Rule>,
@@ -210,6 +219,7 @@ impl Choices {
             let rule = format!("preconditioner=multigrid needs an operator that is one matrix: {able}");
             return Err(Error::bad("operator", operator.name, &rule));
         }
+        let looks = words.count("looks", 0..=1000)?.map_or(LOOKS, |looks| looks as u32);
         let threads = words.count("threads", 0..=4096)?.unwrap_or(0) as usize;
         let memory = words.number("memory", "memory must be a positive number of bytes", positive)?.map(|m| m as u64);
         let without = without(words.take("without"))?;
@@ -232,6 +242,7 @@ impl Choices {
             change,
             tolerance,
             preconditioner,
+            looks,
             threads,
             memory,
             without,
@@ -349,7 +360,7 @@ mod tests {
              integrator=rkl1 stages=5 bounds=free max_applications=7 threads=1 memory=1e9 without=same_h",
             "operator=two-first theta=0.5 gradient=plain normalise=pair integrator=sdirk2 solver_tolerance=1e-6 \
              max_iterations=500 preconditioner=jacobi tolerance=1e-5",
-            "integrator=rkl2 tolerance=off change=0.1 max_stages=9",
+            "integrator=rkl2 tolerance=off change=0.1 max_stages=9 looks=16",
         ];
         let key = |word: &'static str| word.split('=').next().unwrap_or_default();
         let read: Vec<&str> = lines.iter().flat_map(|line| line.split_whitespace()).map(key).collect();

@@ -25,6 +25,8 @@ pub struct Facts {
     /// Particles that exchange heat with the outside.
     pub exchanging: usize,
     pub heated: bool,
+    /// Functions of the host's are looked at between stages.
+    pub watched: bool,
     /// The host has asked for rates and never for a step.
     pub rate_only: bool,
     /// Weights are scaled by their own moments, which must be known first.

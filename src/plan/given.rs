@@ -6,6 +6,7 @@ use crate::array::Strided;
 use crate::error::{Error, Result};
 use crate::memory;
 use crate::model::fields::{self, FIELDS, INPUTS, Slot};
+use crate::pool::Pool;
 use crate::space::{Cloud, Domain};
 use std::cmp::Ordering;
 
@@ -64,6 +65,7 @@ impl State {
             taken[*slot] = Some(offered.inward(FIELDS[*slot].name, host)?);
         }
         let energy = offer.energy.map(|u| u.inward("u", host)).transpose()?;
+        let host_of = |i: usize| host[i] as usize;
         let carried = cloud.as_ref().map(|cloud| self.carried(cloud.host.as_slice())).transpose()?;
         // Where u was given before, T follows the new c_v: in the new order, since that is where both are.
         let kept = carried.as_ref().is_none_or(Option::is_some) && !offer.anew;
@@ -74,6 +76,19 @@ impl State {
                 self.warmed(c_v, (of(fields::T), of(fields::C_V)), carried.and_then(|c| c.energy.as_ref()))?
             }
             _ => None,
+        };
+        // A u that comes without T says what T is.
+        let (alone, beside) = if taken[fields::T].is_none() { (energy, None) } else { (None, energy) };
+        let warmed = match alone {
+            Some(u) => {
+                let carried = carried.as_ref().and_then(|c| c.as_ref()?.inputs[fields::C_V].as_ref());
+                let here = Some(&self.inputs[fields::C_V]).filter(|c_v| kept || !c_v.is_each());
+                let lost =
+                    || Error::OutOfOrder { call: "taking u".into(), missing: "c_v for so many particles".into() };
+                let c_v = taken[fields::C_V].as_ref().or(carried).or(here).ok_or_else(lost)?;
+                Some((temperature(&u, c_v, &self.pool, host_of)?, u))
+            }
+            None => warmed,
         };
 
         self.domain = offer.domain.clone();
@@ -89,7 +104,7 @@ impl State {
             }
         }
         self.heat_up(warmed);
-        if let Some(u) = energy {
+        if let Some(u) = beside {
             self.energy = Energy::Given(u);
         }
         Ok(())
@@ -246,7 +261,7 @@ impl State {
     /// # Errors
     /// As [`State::put`].
     pub fn put_energy(&mut self, u: Input) -> Result<()> {
-        let t = self.temperature(&u, &self.inputs[fields::C_V])?;
+        let t = temperature(&u, &self.inputs[fields::C_V], &self.pool, |i| self.host(i))?;
         self.store(fields::T, t);
         self.energy = Energy::Given(u);
         Ok(())
@@ -270,7 +285,7 @@ impl State {
             (Energy::Given(_), Some(u)) | (Energy::Given(u), None) => u.with(&Input::Number(0.0), |u, _| u)?,
             (Energy::Moved, _) => then.0.with(then.1, |t, c_v| t * c_v)?,
         };
-        Ok(Some((self.temperature(&u, c_v)?, u)))
+        Ok(Some((temperature(&u, c_v, &self.pool, |i| self.host(i))?, u)))
     }
 
     fn heat_up(&mut self, warmed: Option<(Input, Input)>) {
@@ -279,19 +294,20 @@ impl State {
             self.energy = Energy::Given(u);
         }
     }
+}
 
-    fn temperature(&self, u: &Input, c_v: &Input) -> Result<Input> {
-        let t = u.with(c_v, |u, c_v| u / c_v)?;
-        let wrong = match &t {
-            Input::Each(t) => crate::sum::first(&self.pool, t.len(), |i| !t[i].is_finite()),
-            other => other.at(0).filter(|t| !t.is_finite()).map(|_| 0),
-        };
-        match wrong {
-            None => Ok(t),
-            Some(i) => {
-                let value = u.at(i).unwrap_or(0.0);
-                Err(Error::bad_at("u", self.host(i), value, "T = u / c_v must be finite: it is too large for this c_v"))
-            }
+/// T of these energies; an error names the host's number of a particle.
+fn temperature(u: &Input, c_v: &Input, pool: &Pool, host: impl Fn(usize) -> usize) -> Result<Input> {
+    let t = u.with(c_v, |u, c_v| u / c_v)?;
+    let wrong = match &t {
+        Input::Each(t) => crate::sum::first(pool, t.len(), |i| !t[i].is_finite()),
+        other => other.at(0).filter(|t| !t.is_finite()).map(|_| 0),
+    };
+    match wrong {
+        None => Ok(t),
+        Some(i) => {
+            let value = u.at(i).unwrap_or(0.0);
+            Err(Error::bad_at("u", host(i), value, "T = u / c_v must be finite: it is too large for this c_v"))
         }
     }
 }

@@ -1,9 +1,20 @@
 //! From a scene to a list of passes: what runs, what was left out and why, in what memory.
 
+/// Makes a constant of each row, and the table of all: a row exists once, and code names it by its constant.
+macro_rules! table {
+    ($(#[$about:meta])* $table:ident: $type:ty; $($constant:ident = $row:expr;)*) => {
+        $(pub static $constant: $type = $row;)*
+
+        $(#[$about])*
+        pub static $table: &[&$type] = &[$(&$constant),*];
+    };
+}
+
 pub mod applies;
 pub mod auto;
 pub mod choices;
 pub mod facts;
+mod geometry;
 pub mod given;
 pub mod input;
 mod known;
@@ -15,7 +26,10 @@ pub mod report;
 mod room;
 pub mod rules;
 pub mod run;
+mod sample;
 pub mod state;
+mod watch;
+mod weights;
 
 pub use choices::Choices;
 pub use facts::Facts;

@@ -127,6 +127,8 @@ impl Motion<'_> {
     /// Sub-steps of an explicit method that are as long as it is stable, and keeps bounds: none is ever rejected.
     fn march(&mut self, time: f64, dt: f64, t: &mut [f64], report: &mut Report) -> Result<()> {
         let (mut done, before, allowed) = (0.0, self.heat.applications, self.choices.options.max_applications);
+        let mut watch = self.watch(time, dt, t)?;
+        let spread = if watch.is_idle() { 0.0 } else { self.norm(|i| t[i]) };
         while done < dt {
             let needed = (self.heat.applications - before) as f64;
             if needed > allowed as f64 {
@@ -146,7 +148,11 @@ impl Motion<'_> {
                     return self.tell(time, dt, dt);
                 }
             }
-            let schedule = self.choices.method.schedule(dt - done, bounds, &self.choices.options)?;
+            let mut schedule = self.choices.method.schedule(dt - done, bounds, &self.choices.options)?;
+            let part = self.as_watched(&mut watch, time + done, schedule.dt, t, spread)?;
+            if part < schedule.dt {
+                schedule = self.choices.method.schedule(part, bounds, &self.choices.options)?;
+            }
             report.stages = schedule.stages.into();
             let steps = if self.is_fixed() { schedule.substeps } else { 1 };
             for k in 0..steps {
@@ -154,15 +160,14 @@ impl Motion<'_> {
                 self.choices.method.advance(&schedule, &mut self.heat, self.pool, now, t, self.work)?;
                 report.substeps += 1;
                 report.came_in(1.0, self.work.tally);
-                // Later it would be seen at all neighbours.
-                if report.substeps == 1
-                    && let Some(i) = sum::first(self.pool, t.len(), |i| !t[i].is_finite())
-                {
-                    return Err(Error::NotFinite { what: "T".into(), index: self.heat.host[i] as usize, value: t[i] });
+                // Later it would be seen at all neighbours; after the last one it is looked for anyway.
+                if report.substeps == 1 && schedule.substeps > 1 {
+                    self.refuse_what_is_not_finite("T", t)?;
                 }
                 self.tell(time, dt, done + schedule.start(k + 1))?;
             }
-            done = if steps == schedule.substeps { dt } else { done + schedule.start(steps) };
+            let ends = steps == schedule.substeps && schedule.total == dt - done;
+            done = if ends { dt } else { done + schedule.start(steps) };
         }
         Ok(())
     }
@@ -175,12 +180,16 @@ impl Motion<'_> {
         let bounds = self.stability(time, dt, t)?;
         report.limit =
             explicit_limit(if method.is_implicit() { self.known_or_proven(time, t)?.proven } else { bounds });
-        let control = Control { method, tolerance: choices.tolerance, range: self.range };
+        let mut watch = self.watch(time, dt, t)?;
+        let control = Control { method, tolerance: choices.tolerance, range: self.range, raises: watch.raises };
         let mut pace = Adaptive::new(control, self.pool, volume, &mut self.heat, (time, dt), t)?;
-        if let Some((i, value)) = pace.first_bad_rate() {
-            return Err(Error::NotFinite { what: "dT/dt".into(), index: self.heat.host[i] as usize, value });
+        let fastest = sum::max(self.pool, t.len(), |i| pace.rate()[i].abs());
+        if !fastest.is_finite() {
+            // No sub-step is short enough.
+            self.refuse_what_is_not_finite("dT/dt", pace.rate())?;
         }
-        if pace.is_still() && self.heat.is_autonomous() {
+        // With a rate of 0 everywhere T stays as it is, however long the step.
+        if fastest <= 0.0 && self.heat.is_autonomous() {
             (report.substeps, report.stages) = (1, 1);
             report.came_in(dt, self.heat.tally());
             return self.tell(time, dt, dt);
@@ -191,8 +200,9 @@ impl Motion<'_> {
         let mut done = 0.0;
         while done < dt {
             let (now, rest) = (time + done, dt - done);
-            let most = self.practical_limit(now, t, reference.max(pace.moved(t)))?;
-            let part = pace.next(rest, most);
+            let scale = reference.max(pace.moved(t));
+            let most = self.practical_limit(now, t, scale.max(watch.raises))?;
+            let part = self.as_watched(&mut watch, now, pace.next(rest, most), t, scale)?;
             let bounds = self.stability(now, part, t)?;
             let (method, schedule) = self.schedule(part, bounds)?;
             report.stages = schedule.stages.into();
@@ -212,6 +222,10 @@ impl Motion<'_> {
     fn stability(&mut self, time: f64, dt: f64, t: &[f64]) -> Result<Bounds> {
         let calm = Bounds { spectral: 0.0, diagonal: 0.0 };
         if self.choices.method.is_implicit() { Ok(calm) } else { self.bounds(time, dt, t) }
+    }
+
+    fn refuse_what_is_not_finite(&self, what: &str, values: &[f64]) -> Result<()> {
+        heat::refuse_what_is_not_finite(self.pool, self.heat.host, values, |_| what.into())
     }
 
     /// Whether nothing changes, and nothing will.
@@ -280,7 +294,7 @@ impl Motion<'_> {
         // What a function of the host's heats may relax as a whole; all else moves the mean at a steady pace.
         let speed = match self.heat.is_autonomous() {
             true => self.norm(|i| rate[i]),
-            false => sum::rms(self.pool, t.len(), |i| self.heat.volume[i], |i| rate[i]),
+            false => self.rms(|i| rate[i]),
         };
         let most = change * reference / speed;
         Ok(if most > 0.0 { most } else { f64::INFINITY })

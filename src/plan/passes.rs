@@ -106,32 +106,32 @@ fn each_stage(wanted: bool) -> Option<When> {
     wanted.then_some(When::EachStage)
 }
 
-const NO_COST: fn(&Scene) -> Cost = |_| Cost { bytes: 0.0, pairs: 0.0 };
-
-/// Makes a constant of each pass, and the table of all.
-macro_rules! table {
-    ($($constant:ident = $pass:expr;)*) => {
-        $(pub static $constant: Pass = $pass;)*
-
-        /// Every pass, in the order in which they run.
-        pub static PASSES: &[&Pass] = &[$(&$constant),*];
-    };
-}
+/// What a row says nothing of: it costs nothing, and makes nothing by itself.
+const PLAIN: Pass = Pass {
+    name: Name(""),
+    when: |_| None,
+    about: |_| String::new(),
+    cost: |_| Cost { bytes: 0.0, pairs: 0.0 },
+    make: None,
+};
 
 table! {
+    /// Every pass, in the order in which they run.
+    PASSES: Pass;
+
     SORT = Pass {
         name: Name("sort"),
         when: |s| s.setup(),
         about: |_| "particles along a Morton curve".into(),
         cost: |s| s.cost([0.0, 8.0 * s.facts.dim as f64 + 4.0], 0.0),
-        make: None,
+        ..PLAIN
     };
     DENSITY = Pass {
         name: Name("density"),
         when: |s| s.setup_if(s.facts.finds_h || s.facts.sums_rho),
         about: |s| if s.facts.finds_h { "rho and h together" } else { "rho by summation" }.into(),
         cost: |s| s.cost([0.0, 16.0], 1.0),
-        make: None,
+        ..PLAIN
     };
     WEIGHTS = Pass {
         name: Name("weights"),
@@ -167,8 +167,8 @@ table! {
         name: Name("walls"),
         when: |s| s.setup_if(s.facts.walls),
         about: |_| "exchanges with particles of fixed T, completed by what lies behind them".into(),
-        cost: NO_COST,
         make: Some(State::complete_walls),
+        ..PLAIN
     };
     SWEEPS = Pass {
         name: Name("sweeps"),
@@ -180,9 +180,9 @@ table! {
     TRUST = Pass {
         name: Name("trust"),
         when: |s| s.setup(),
-        about: |_| "no weight is NaN, and volumes fit distances".into(),
-        cost: NO_COST,
+        about: |_| "no weight is NaN, volumes fit distances, and a sample sees neighbours in all directions".into(),
         make: Some(State::trust_weights),
+        ..PLAIN
     };
     FOLD = Pass {
         name: Name("fold"),
@@ -196,83 +196,86 @@ table! {
         when: |s| (!s.moves_t()).then_some(When::EachStep),
         about: |_| "du/dt for a host that integrates itself".into(),
         cost: |s| s.cost([0.0; 2], 1.0),
-        make: None,
+        ..PLAIN
     };
     CIRCLES = Pass {
         name: Name("circles"),
         when: |s| if s.facts.kappa_of_t { Some(When::EachStep) } else { s.setup() }.filter(|_| s.moves_t()),
         about: |_| "Gershgorin's circles: a bound on every rate".into(),
         cost: |s| s.cost([0.0; 2], 1.0),
-        make: None,
+        ..PLAIN
     };
     BOUND = Pass {
         name: Name("bound"),
         when: |s| (CIRCLES.when)(s).filter(|_| !s.facts.implicit),
         about: |_| "Lanczos' method, where it saves stages".into(),
         cost: |s| s.cost([0.0; 2], 1.0),
-        make: None,
+        ..PLAIN
     };
     SPECTRUM = Pass {
         name: Name("spectrum"),
         when: |s| s.setup_if(s.moves_t() && !s.leaves_out(&rules::DECAYS) && !s.facts.kappa_of_t),
         about: |_| "Arnoldi's method: refused where a mode grows".into(),
         cost: |s| s.cost([0.0, 320.0], 40.0),
-        make: None,
+        ..PLAIN
+    };
+    WATCH = Pass {
+        name: Name("watch"),
+        when: |s| (s.moves_t() && s.facts.watched).then_some(When::EachStep),
+        about: |s| format!("the host's functions at {} times of a step, and between where they change", s.choices.looks),
+        ..PLAIN
     };
     KAPPA = Pass {
         name: Name("kappa"),
         when: |s| each_stage(s.moves_t() && s.facts.kappa_of_t),
         about: |_| "kappa(T)".into(),
         cost: |s| s.cost([0.0, 8.0], 0.0),
-        make: None,
+        ..PLAIN
     };
     SOLVE = Pass {
         name: Name("solve"),
         when: |s| each_stage(s.moves_t() && s.facts.implicit),
         about: |s| s.motion(&format!("conjugate gradients on rows of weights; {}", s.facts.preconditioning.about)),
         cost: |s| s.cost([0.0, 8.0 * s.facts.buffers], 1.0),
-        make: None,
+        ..PLAIN
     };
     STAGES = Pass {
         name: Name("stages"),
         when: |s| each_stage(s.moves_t() && !s.facts.implicit),
         about: |s| s.motion("rows of weights"),
         cost: |s| s.cost([0.0, 8.0 * s.facts.buffers], 1.0),
-        make: None,
+        ..PLAIN
     };
     SURFACE = Pass {
         name: Name("surface"),
         when: |s| each_stage(!s.leaves_out(&rules::NO_WALL)),
         about: |_| "exchange with the outside".into(),
         cost: |s| Cost { bytes: 48.0 * s.facts.exchanging as f64, pairs: 0.0 },
-        make: None,
+        ..PLAIN
     };
     SOURCE = Pass {
         name: Name("source"),
         when: |s| each_stage(!s.leaves_out(&rules::NO_SOURCE)),
         about: |_| "heat released in the volume".into(),
         cost: |s| s.cost([0.0, 8.0], 0.0),
-        make: None,
+        ..PLAIN
     };
     NORM = Pass {
         name: Name("norm"),
         when: |s| (s.moves_t() && !s.leaves_out(&rules::POSITIVE)).then_some(When::EachStep),
         about: |_| "of T before and after: no growth".into(),
-        cost: NO_COST,
-        make: None,
+        ..PLAIN
     };
     CHECK = Pass {
         name: Name("check"),
         when: |s| s.moves_t().then_some(When::EachStep),
         about: |s| if s.facts.keeps_bounds { "finite, within the bounds of before" } else { "finite" }.into(),
-        cost: NO_COST,
-        make: None,
+        ..PLAIN
     };
     COMMIT = Pass {
         name: Name("commit"),
         when: |s| s.moves_t().then_some(When::EachStep),
         about: |_| "the new state replaces the old".into(),
-        cost: NO_COST,
-        make: None,
+        ..PLAIN
     };
 }

@@ -1,8 +1,9 @@
-//! What the passes of set-up do: each makes something that stages need, where it is missing.
+//! From what a host gave to a right-hand side that can be moved: the passes that make something are run where it is
+//! missing. What they do is in [`super::geometry`] and [`super::weights`].
 
 use super::motion::Motion;
 use super::passes::{self, Pass};
-use super::state::{Directions, Geometry, Input, State, Weights, least};
+use super::state::{Directions, Input, State, Weights};
 use super::{Choices, Plan, rules};
 use crate::error::{Error, Result};
 use crate::integrator::Range;
@@ -11,24 +12,10 @@ use crate::model::fields::{self, FIELDS, INPUTS, Slot};
 use crate::model::heat::{Conductivity, Heat, Power, Release};
 use crate::model::surface::{Exchange, Surface};
 use crate::model::tensor::Tensor;
-use crate::operator::normalise::Normals;
-use crate::operator::table::{self, Fit, OPERATORS, Sweeps};
-use crate::operator::twice::Recipe;
-use crate::operator::walls::Walls;
-use crate::operator::{Assembly, Engine, Matrix, Multigrid, Sym, Twice, bypass, tensor};
-use crate::space::{density, rows::Rows};
+use crate::operator::table::{Fit, OPERATORS};
+use crate::operator::{Assembly, Engine, Multigrid, Sym, bypass, tensor};
+use crate::space::rows::Rows;
 use std::borrow::Cow;
-
-/// How much thinner than wide a cloud is that has no thickness but rounding's.
-const FLAT: f64 = 1e-12;
-
-/// One block in this many is looked at to estimate the number of neighbours.
-const SAMPLE: usize = 16;
-
-/// Fewest particles of which the median K_d2 says anything.
-const SAMPLED: usize = 10;
-/// What it may be: lattices have 0.8 to 1.2, lines in 3-D 0.3; without neighbours it is 0.
-const PLAUSIBLE: std::ops::RangeInclusive<f64> = 0.1..=10.0;
 
 impl State {
     /// The plan of the scene as it stands.
@@ -86,7 +73,7 @@ impl State {
         Ok(plan)
     }
 
-    fn need(&self, slot: Slot, call: &str) -> Result<()> {
+    pub(super) fn need(&self, slot: Slot, call: &str) -> Result<()> {
         let set = self.inputs[slot] != Input::Unset || self.is_empty();
         let missing = || format!("{} ({})", FIELDS[slot].name, FIELDS[slot].about);
         if set { Ok(()) } else { Err(Error::OutOfOrder { call: call.into(), missing: missing() }) }
@@ -124,148 +111,6 @@ impl State {
         Ok(())
     }
 
-    /// Smoothing lengths, densities and volumes, given or computed, on cells that fit them: the same bits for the same
-    /// particles, whatever was asked before.
-    pub fn prepare_geometry(&mut self, call: &str) -> Result<()> {
-        self.settle_ties()?;
-        if self.geometry.is_some() {
-            return Ok(());
-        }
-        self.cloud(call)?;
-        self.refuse_lost(call, [fields::M, fields::RHO, fields::H])?;
-        self.need(fields::M, call)?;
-        // Along axes that are not periodic, whatever the reach.
-        self.refuse_flat(f64::INFINITY)?;
-        let start = std::time::Instant::now();
-        if self.inputs[fields::H] == Input::Unset && self.inputs[fields::RHO] == Input::Unset {
-            let h = self.find_lengths(call)?;
-            self.inputs[fields::H] = Input::Each(h);
-            let made = self.make_geometry(call, true);
-            self.inputs[fields::H] = Input::Unset;
-            self.geometry = Some(made?);
-            self.timers.add(passes::DENSITY.name, start.elapsed());
-        } else {
-            self.geometry = Some(self.make_geometry(call, false)?);
-            self.timers.add(passes::SORT.name, start.elapsed());
-        }
-        Ok(())
-    }
-
-    /// h together with rho, from the lengths found last where there are any.
-    fn find_lengths(&mut self, call: &str) -> Result<Vec<f64>> {
-        // The search for h reaches as far as it may be expected to be; what is found decides on the order that stays.
-        let reach = self.reach(&self.domain, self.len(), |axis| self.extent(axis));
-        self.sort_for(reach)?;
-        let start = match self.last_h.len() == self.len() {
-            true => memory::collected("h", self.cloud(call)?.host.iter().map(|&host| self.last_h[host as usize]))?,
-            false => self.guessed_lengths(call)?,
-        };
-        let m = self.each(fields::M)?;
-        let cloud = self.cloud(call)?;
-        let h = density::smoothing_lengths(&self.choices.kernel, self.choices.h_fac, cloud, &m, start, &self.pool)?;
-        let mut by_host = memory::filled("h", cloud.len(), 0.0)?;
-        cloud.host.iter().zip(&h).for_each(|(&host, &h)| by_host[host as usize] = h);
-        self.found_h = by_host;
-        Ok(h)
-    }
-
-    /// A first guess of h, from cells that are not crowded by far: where one particle far away made them too long, from
-    /// shorter ones.
-    fn guessed_lengths(&mut self, call: &str) -> Result<Vec<f64>> {
-        loop {
-            let h = density::guess(self.cloud(call)?, self.choices.h_fac, &self.pool)?;
-            let (reach, before) = (self.choices.kernel.radius() * least(&h), self.cloud(call)?.grid.edge);
-            if !self.cloud(call)?.is_coarse_for(reach) {
-                return Ok(h);
-            }
-            self.sort_again(reach)?;
-            if self.cloud(call)?.grid.edge >= before {
-                return density::guess(self.cloud(call)?, self.choices.h_fac, &self.pool);
-            }
-        }
-    }
-
-    /// `found`: h was found together with rho, and tells it.
-    fn make_geometry(&mut self, call: &str, found: bool) -> Result<Geometry> {
-        let (nu, radius) = (self.dim() as f64, self.choices.kernel.radius());
-        let mut h = self.lengths(nu)?;
-        let reach = radius * h.iter().copied().fold(0.0, f64::max);
-        self.refuse_flat(reach)?;
-        let shortest = radius * least(&h);
-        if !self.cloud(call)?.suits(shortest) {
-            self.sort_for(shortest)?;
-            h = self.lengths(nu)?;
-        }
-        let m = self.each(fields::M)?;
-        let cloud = self.cloud(call)?;
-        let rows = Rows::new(cloud, &h, radius, &self.pool)?;
-        let rho = match &self.inputs[fields::RHO] {
-            Input::Unset if found => {
-                let rho = |(m, h): (&f64, &f64)| m * (self.choices.h_fac / h).powf(nu);
-                memory::collected("rho", m.iter().zip(&h).map(rho))?
-            }
-            Input::Unset => density::sum(&self.choices.kernel, &rows, &m, &self.pool)?,
-            _ => self.each(fields::RHO)?,
-        };
-        let (same_h, neighbours) = (rows.same_h(), rows.mean_neighbours(&self.pool, SAMPLE)?);
-        let volume = memory::collected("volumes", m.iter().zip(&rho).map(|(m, rho)| m / rho))?;
-        Ok(Geometry { h, rho, volume, same_h, neighbours })
-    }
-
-    /// Refuses particles that leave an axis of their space empty: sums over neighbours would take a disc for a ball.
-    /// Where the axis is periodic and images of the particles are among the neighbours, it is not empty.
-    fn refuse_flat(&self, reach: f64) -> Result<()> {
-        let thick = self.needs_thickness() && reach.is_finite();
-        let Some(cloud) = self.cloud.as_ref().filter(|c| c.len() > c.dim() && (thick || !self.choices.allow.flat))
-        else {
-            return Ok(());
-        };
-        let dim = cloud.dim();
-        let extents: Vec<f64> = (0..dim).map(|axis| self.extent(axis)).collect();
-        let widest = extents.iter().copied().fold(0.0, f64::max);
-        let imaged = |axis: usize| cloud.domain.periodic[axis] && reach >= cloud.domain.length(axis);
-        let spacing = reach / (self.choices.kernel.radius() * self.choices.h_fac);
-        let least = if thick { 0.5 * spacing } else { 0.0 };
-        let empty: Vec<usize> = (0..dim).filter(|&a| extents[a] <= least.max(FLAT * widest) && !imaged(a)).collect();
-        if empty.is_empty() || widest == 0.0 {
-            return Ok(());
-        }
-        let axes: Vec<&str> = empty.iter().map(|&a| ["x", "y", "z"][a]).collect();
-        let (axes, rest) = (axes.join(" and "), dim - empty.len());
-        if thick {
-            let rule = format!(
-                "particles less than half a spacing thick along {axes} conduct wrong with it: use operator=brookshaw, kernel or \
-                 projected, or fewer dimensions"
-            );
-            return Err(Error::bad("operator", self.choices.operator.name, &rule));
-        }
-        let value = format!("flat along {axes}: all {} particles have the same", cloud.len());
-        let rule = format!(
-            "particles that fill {rest} of {dim} dimensions need dim={rest} and their other coordinates alone; a sheet or a \
-             row of one layer in {dim}-D space is had by insisting with allow=flat"
-        );
-        Err(Error::bad("x", value, &rule))
-    }
-
-    /// Whether the operator is wrong in sheets and strings of one layer: two gradients see noise across them, and weights
-    /// that are scaled in the mean over directions conduct too well along them.
-    fn needs_thickness(&self) -> bool {
-        !self.choices.operator.is_one_matrix() || matches!(self.choices.operator.fit, Fit::Moments)
-    }
-
-    /// h as given, or h_fac (m/rho)^(1/nu).
-    fn lengths(&self, nu: f64) -> Result<Vec<f64>> {
-        if self.inputs[fields::H] != Input::Unset {
-            return self.each(fields::H);
-        }
-        let h = |m: f64, rho: f64| self.choices.h_fac * (m / rho).powf(1.0 / nu);
-        if let (Input::Number(m), Input::Number(rho)) = (&self.inputs[fields::M], &self.inputs[fields::RHO]) {
-            return memory::filled("h", self.len(), h(*m, *rho));
-        }
-        let (m, rho) = (self.each(fields::M)?, self.each(fields::RHO)?);
-        memory::collected("h", m.iter().zip(&rho).map(|(m, rho)| h(*m, *rho)))
-    }
-
     /// An input as an array; a number is repeated.
     pub fn each(&self, slot: Slot) -> Result<Vec<f64>> {
         self.refuse_lost(FIELDS[slot].name, [slot])?;
@@ -280,7 +125,7 @@ impl State {
     }
 
     /// kappa as an array; a number is repeated.
-    fn each_kappa(&self) -> Result<Vec<f64>> {
+    pub(super) fn each_kappa(&self) -> Result<Vec<f64>> {
         self.repeated("kappa", self.kappa())
     }
 
@@ -335,163 +180,12 @@ impl State {
         Ok(())
     }
 
-    /// Rows of weights, each by itself.
-    pub(super) fn make_weights(&mut self, plan: &Plan) -> Result<bool> {
-        if self.weights.is_some() {
-            return Ok(false);
-        }
-        self.refuse_weights_without_room(self.geometry.as_ref().map_or(0.0, |g| g.neighbours))?;
-        let (matrix, normals) = self.with_assembly(plan.leaves_out(&rules::SAME_H), |a| a.rows(&self.pool))?;
-        let moments = Vec::new();
-        let normals = Some(normals);
-        self.weights =
-            Some(Weights { matrix, normals, twice: None, moments, defect: None, paired: false, folded: false });
-        Ok(true)
-    }
-
-    pub(super) fn join_weights(&mut self, plan: &Plan) -> Result<bool> {
-        self.change_weights(plan, |state, a, Weights { matrix, normals, .. }| match normals {
-            Some(normals) => a.join(matrix, normals, &state.pool),
-            None => Ok(()),
-        })
-    }
-
-    pub(super) fn normalise_weights(&mut self, plan: &Plan) -> Result<bool> {
-        self.change_weights(plan, |state, a, Weights { matrix, normals, moments, .. }| {
-            let Some(normals) = normals else { return Ok(()) };
-            *moments = memory::copied("second moments", &normals.moments)?;
-            state.at_walls(|walls| walls.complete_normals(a, matrix, normals))?;
-            a.normalise(matrix, normals, &state.pool)
-        })
-    }
-
-    pub(super) fn complete_walls(&mut self, plan: &Plan) -> Result<bool> {
-        self.change_weights(plan, |state, _, Weights { matrix, .. }| state.at_walls(|walls| walls.complete(matrix)))
-    }
-
-    /// What an operator of two sweeps holds beside the weights of pairs.
-    pub(super) fn make_sweeps(&mut self, plan: &Plan) -> Result<bool> {
-        self.change_weights(plan, |state, a, weights| {
-            weights.twice = Some(state.twice(a)?);
-            Ok(())
-        })
-    }
-
-    /// Weights that are made are those of a step, if they are numbers and volumes fit distances.
-    pub(super) fn trust_weights(&mut self, plan: &Plan) -> Result<bool> {
-        self.change_weights(plan, |state, _, weights| {
-            if let Some(i) = weights.matrix.first_bad(&state.pool) {
-                return Err(state.odd_volume(weights.matrix.columns(i)));
-            }
-            let Some(Normals { moments, paired, defect, .. }) = weights.normals.take() else { return Ok(()) };
-            if weights.moments.is_empty() {
-                weights.moments = moments;
-            }
-            (weights.paired, weights.defect) = (paired.contains(&true), defect);
-            state.refuse_wrong_volumes(&weights.matrix, &weights.moments)
-        })
-    }
-
-    /// What is wrong with a row of weights that are no numbers: the volume farthest from the others.
-    fn odd_volume(&self, row: &[u32]) -> Error {
-        let volume = |i: u32| self.geometry.as_ref().map_or(1.0, |g| g.volume[i as usize]);
-        let mean = row.iter().map(|&i| volume(i).ln()).sum::<f64>() / row.len().max(1) as f64;
-        let far = |i: u32| (volume(i).ln() - mean).abs();
-        let i = row.iter().copied().max_by(|&a, &b| far(a).total_cmp(&far(b))).unwrap_or(0);
-        let rule =
-            "a volume m/rho so far from those around it makes weights that are no numbers: check m, rho and h there";
-        Error::bad_at("rho", self.host(i as usize), format!("for a volume of {:e}", volume(i)), rule)
-    }
-
-    /// Calls `change` with weights that are being made; they are given up where it fails.
-    fn change_weights(
-        &mut self,
-        plan: &Plan,
-        change: impl FnOnce(&State, &Assembly, &mut Weights) -> Result<()>,
-    ) -> Result<bool> {
-        let Some(mut weights) = self.weights.take_if(|w| w.normals.is_some()) else { return Ok(false) };
-        self.with_assembly(plan.leaves_out(&rules::SAME_H), |a| change(self, a, &mut weights))?;
-        self.weights = Some(weights);
-        Ok(true)
-    }
-
     /// Weights as they are before kappa is folded into them.
     pub fn prepare_unfolded(&mut self, call: &str) -> Result<&Weights> {
         let plan = self.prepare_fresh(call)?;
         self.weights = self.weights.take().filter(|w| !w.folded);
         self.make(&plan, |pass| *pass != passes::FOLD)?;
         self.weights.as_ref().ok_or(Error::OutOfOrder { call: call.into(), missing: "set_particles".into() })
-    }
-
-    /// Refuses particles whose volumes have nothing to do with their distances: nothing, or far too much, would flow
-    /// between most of them. Few particles are no sample, and some may be anywhere.
-    fn refuse_wrong_volumes(&self, matrix: &Matrix, moments: &[f64]) -> Result<()> {
-        let n = moments.len();
-        if n < SAMPLED || self.choices.allow.volumes {
-            return Ok(());
-        }
-        let mut sorted = memory::copied("second moments", moments)?;
-        let median = *sorted.select_nth_unstable_by(n / 2, f64::total_cmp).1;
-        if PLAUSIBLE.contains(&median) {
-            return Ok(());
-        }
-        let typical = (0..n).filter(|&i| moments[i] == median).map(|i| (self.host(i), i)).min();
-        let (host, i) = typical.unwrap_or((0, 0));
-        let rule = format!(
-            "half of the particles are at or beyond this one, which has {} neighbours: m/rho should be the volume that a \
-             particle has, and K_d2 is then near 1; check m, rho and their units, give h or a larger h_fac, or insist \
-             with allow=volumes",
-            matrix.neighbours(i)
-        );
-        Err(Error::bad_at("K_d2", host, format!("{median:.3e}"), &rule))
-    }
-
-    /// Calls `work` where some particles are walls.
-    fn at_walls(&self, work: impl FnOnce(&Walls<&(dyn Fn(usize) -> bool + Sync + Send)>) -> Result<()>) -> Result<()> {
-        if !self.has_walls() {
-            return Ok(());
-        }
-        let (fixed, pool) = (&self.inputs[fields::FIXED], &self.pool);
-        let fixed = |i: usize| fixed.at(i).is_some_and(|f| f != 0.0);
-        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
-        self.with_rows(|rows| work(&Walls { rows, volume, fixed: &fixed, pool }))
-    }
-
-    fn twice(&self, assembly: &Assembly) -> Result<Twice> {
-        let (mass, choices) = (self.each(fields::M)?, &self.choices);
-        let low = match choices.operator.sweeps {
-            Sweeps::Two { limited: true } => Some(self.monotone_weights(assembly)?),
-            _ => None,
-        };
-        let plain = if choices.corrected { None } else { Some(self.inverse_density(&mass)?) };
-        let recipe = Recipe { mass: &mass, plain: plain.as_deref(), theta: choices.theta, low };
-        Twice::store(assembly, recipe, &self.pool)
-    }
-
-    /// The operator `monotone` on these particles, whatever the one that was chosen.
-    fn monotone_weights(&self, assembly: &Assembly) -> Result<Matrix> {
-        let operator = table::find("monotone")?;
-        let (matrix, _) = Assembly { operator, normalise: operator.normalise, ..*assembly }.store(&self.pool)?;
-        Ok(matrix)
-    }
-
-    /// 1/(Omega rho)
-    fn inverse_density(&self, mass: &[f64]) -> Result<Vec<f64>> {
-        let omega = self.with_rows(|rows| density::omega(&self.choices.kernel, rows, mass, &self.pool))?;
-        let rho = self.geometry.as_ref().map_or(&[][..], |g| &g.rho);
-        memory::collected("densities", omega.iter().zip(rho).map(|(omega, rho)| 1.0 / (omega * rho)))
-    }
-
-    pub(super) fn fold_kappa(&mut self, _: &Plan) -> Result<bool> {
-        if self.weights.as_ref().is_none_or(|w| w.folded) {
-            return Ok(false);
-        }
-        let (kappa, mean) = (self.each_kappa()?, self.mean());
-        if let Some(weights) = &mut self.weights {
-            weights.matrix.scale(&self.pool, |a, b| mean.of(kappa[a], kappa[b]));
-            weights.folded = true;
-        }
-        Ok(true)
     }
 
     fn prepare_capacity(&mut self) -> Result<()> {
@@ -506,7 +200,7 @@ impl State {
         let inverse = memory::collected("capacities", (0..self.len()).map(inverse))?;
         let moves = |i: usize| fixed.at(i) == Some(0.0);
         let bad = (0..inverse.len()).find(|&i| moves(i) && !(inverse[i] > 0.0 && inverse[i].is_finite()));
-        if let (Some(i), Some(m), Some(c_v)) = (bad, bad.and_then(|i| m.at(i)), bad.and_then(|i| c_v.at(i))) {
+        if let Some((i, m, c_v)) = bad.and_then(|i| Some((i, m.at(i)?, c_v.at(i)?))) {
             let rule = format!("its product with m = {m:e} is beyond all numbers: choose other units");
             return Err(Error::bad_at("c_v", self.host(i), format!("{c_v:e}"), &rule));
         }

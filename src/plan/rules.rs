@@ -31,17 +31,10 @@ pub struct Rule {
     pub holds: fn(&Facts) -> bool,
 }
 
-/// Makes a constant of each rule, and the table of all: a rule exists once, and code names it by its constant.
-macro_rules! table {
-    ($($constant:ident = $rule:expr;)*) => {
-        $(pub static $constant: Rule = $rule;)*
-
-        /// Every rule, in the order in which the plan prints them.
-        pub static RULES: &[&Rule] = &[$(&$constant),*];
-    };
-}
-
 table! {
+    /// Every rule, in the order in which the plan prints them.
+    RULES: Rule;
+
     AT_REST = Rule {
         name: "at_rest",
         reason: "the particles do not move: no sort, no pairs, no weights after the first step",

@@ -22,6 +22,9 @@ const MADE: f64 = 0.01;
 /// distance: a hot disc rings by 5 % under two-first, whatever dt is.
 const RINGING: f64 = 0.1;
 
+/// Spread of T, relative to T, below which it is counted from its middle: subtracted without rounding.
+const NEARLY: f64 = 1e-3;
+
 /// What is true of T before a step, to be compared with after.
 struct Before {
     /// What the maximum principle allows T to be.
@@ -66,9 +69,12 @@ impl State {
         let range = if self.choices.bounds == Promise::Kept { before.range } else { Range::FINITE };
         let integrator = self.choices.method.name;
         let mut report = Report { dt, integrator, energy_before: self.finite_energy(&t)?, ..Report::default() };
-        self.with_motion(&plan, |motion| {
-            motion.range = range;
-            motion.advance(time, dt, &mut t, &mut report)
+        let origin = self.origin(&t);
+        self.counted_from(origin, &mut t, |state, t| {
+            state.with_motion(&plan, |motion| {
+                motion.range = Range { low: range.low - origin, high: range.high - origin };
+                motion.advance(time, dt, t, &mut report)
+            })
         })
         .map_err(|error| self.of_whole_step(error, dt))?;
         let checked = Instant::now();
@@ -194,6 +200,44 @@ impl State {
         (sum::min(&self.pool, t.len(), |i| t[i]), sum::max(&self.pool, t.len(), |i| t[i]))
     }
 
+    /// What T is counted from in a step: its middle, where it differs by little of itself and nothing depends on more than
+    /// differences. What rounding does is then in proportion to them.
+    fn origin(&self, t: &[f64]) -> f64 {
+        let absolute = self.kappa_of_t() || self.source_host.is_some();
+        if absolute || self.surface.as_ref().is_some_and(|s| !s.is_linear()) {
+            return 0.0;
+        }
+        let (low, high) = self.extrema(t);
+        let (low, high) = self.surface.as_ref().map_or((low, high), |s| s.with_surroundings(low, high));
+        let middle = 0.5 * low + 0.5 * high;
+        if high > low && high - low <= NEARLY * middle.abs() { middle } else { 0.0 }
+    }
+
+    /// Calls `work` with T counted from `origin`.
+    fn counted_from(
+        &mut self,
+        origin: f64,
+        t: &mut [f64],
+        work: impl FnOnce(&mut State, &mut [f64]) -> Result<()>,
+    ) -> Result<()> {
+        if origin == 0.0 {
+            return work(self, t);
+        }
+        let moved = self.surface.as_ref().map(|s| s.counted_from(origin)).transpose()?;
+        let surface = std::mem::replace(&mut self.surface, moved);
+        self.pool.update(t, |_, part| part.iter_mut().for_each(|t| *t -= origin));
+        let done = work(self, t);
+        self.pool.update(t, |_, part| part.iter_mut().for_each(|t| *t += origin));
+        self.surface = surface;
+        done.map_err(|error| match error {
+            Error::OutOfBounds { index, value, low, high, promise } => {
+                let [value, low, high] = [value, low, high].map(|v| v + origin);
+                Error::OutOfBounds { index, value, low, high, promise }
+            }
+            other => other,
+        })
+    }
+
     fn before(&mut self, plan: &Plan, t: &[f64]) -> Before {
         let (low, high) = self.extrema(t);
         if self.choices.bounds == Promise::Kept || self.span.is_none() {
@@ -298,10 +342,8 @@ impl State {
     }
 
     fn refuse_what_is_not_finite(&self, what: &str, values: &[f64]) -> Result<()> {
-        match sum::first(&self.pool, values.len(), |i| !values[i].is_finite()) {
-            Some(i) => Err(Error::NotFinite { what: what.into(), index: self.host(i), value: values[i] }),
-            None => Ok(()),
-        }
+        let particles = self.cloud.as_ref().map_or(&[][..], |cloud| &cloud.host);
+        heat::refuse_what_is_not_finite(&self.pool, particles, values, |_| what.into())
     }
 
     fn check(&mut self, plan: &Plan, before: &Before, t: &[f64]) -> Result<()> {

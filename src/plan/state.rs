@@ -18,7 +18,7 @@ use crate::model::surface::Surface;
 use crate::operator::normalise::Normals;
 use crate::operator::{Matrix, Mean, Multigrid, Normalise, Sym, Twice};
 use crate::pool::Pool;
-use crate::space::{Cloud, Domain, facing};
+use crate::space::{Cloud, Domain, density, facing};
 use crate::sum;
 
 /// What follows from positions, masses, densities and smoothing lengths; internal order.
@@ -356,7 +356,7 @@ impl State {
     /// is seen by how well the volumes of the neighbours' neighbours fill space.
     fn density_supports(&self) -> f64 {
         let equal = match &self.inputs[fields::M] {
-            Input::Each(m) => m.iter().all(|mass| mass == &m[0]),
+            Input::Each(m) => density::are_equal(m),
             _ => true,
         };
         match (&self.inputs[fields::RHO], equal) {
@@ -414,6 +414,7 @@ impl State {
             mean: self.mean(),
             exchanging,
             heated,
+            watched: choices.looks > 0 && (self.source_host.is_some() || self.kappa_host.is_some()),
             rate_only: self.rates > 0 && self.steps == 0,
             normalised: choices.normalise != Normalise::No,
             tensor: self.directions.as_ref().is_some_and(|d| !d.shape.is_empty()),

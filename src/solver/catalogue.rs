@@ -71,12 +71,15 @@ fn filled_in(about: &str) -> String {
 }
 
 fn fields() -> Vec<Item> {
-    let about = |f: &crate::model::fields::Field| match f.access {
-        Access::Input { default: Some(v), .. } => format!("{} [{}], set or get, default {v}", f.about, f.unit),
-        Access::Input { default: None, .. } => format!("{} [{}], set or get", f.about, f.unit),
-        Access::Output if f.vector => format!("{} [{}], get, dim components", f.about, f.unit),
-        Access::Output if ["x", "u", "b"].contains(&f.name) => format!("{} [{}], set or get", f.about, f.unit),
-        Access::Output => format!("{} [{}], get", f.about, f.unit),
+    let about = |f: &crate::model::fields::Field| {
+        let (verb, default) = match f.access {
+            Access::Input { default, .. } => ("set or get", default),
+            Access::Output { settable: true } => ("set or get", None),
+            Access::Output { settable: false } => ("get", None),
+        };
+        let components = if f.vector { ", dim components" } else { "" };
+        let default = default.map_or(String::new(), |v| format!(", default {v}"));
+        format!("{} [{}], {verb}{components}{default}", f.about, f.unit)
     };
     FIELDS.iter().map(|f| item(f.name, about(f))).collect()
 }

@@ -113,7 +113,7 @@ impl Solver {
 
     /// Particles from a VTK file. From a snapshot of ours: all that it holds, in place of what was set before, so that the
     /// solver goes on as the one that wrote it; its words and callbacks stay. From the file of another program: positions,
-    /// every array of one component that has the name of an input, and the time if there is one. Where fewer than three dimensions are
+    /// every array of one component that has the name of an input, u where there is no T, b, and the time if there is one. Where fewer than three dimensions are
     /// filled, they may be along any axes. Answers what the file has that was left aside.
     ///
     /// # Errors
@@ -126,7 +126,8 @@ impl Solver {
         let ours = restart::is_ours(&snapshot);
         let has_t = snapshot.field("T").is_some();
         let is_input = |name: &str| FIELDS[..INPUTS].iter().any(|f| f.name == name) || (name == "u" && !has_t);
-        Ok(snapshot.told(|field| ours || (field.components == 1 && is_input(&field.name))))
+        let is_vector = |field: &Field| field.components == 3 && field.name == "b";
+        Ok(snapshot.told(|field| ours || is_vector(field) || (field.components == 1 && is_input(&field.name))))
     }
 
     /// The same from a snapshot in memory.
@@ -155,17 +156,20 @@ impl Solver {
                 None => {}
             }
         }
+        if notes.is_none() && !found.iter().any(|(slot, _)| (fields::B..fields::B + 3).contains(slot)) {
+            found.extend(directions(snapshot, &frame)?);
+        }
         let mut given: Vec<(usize, Offered)> = Vec::new();
         for (slot, values) in &found {
             let values = Strided::packed(values);
-            check(*slot, FIELDS[*slot].name, &values, n)?;
+            check(*slot, FIELDS[*slot].name, &values, (n, dim))?;
             given.push((*slot, Offered::Each(values)));
         }
         let Some(notes) = notes else {
             let domain = self.state.domain.clone();
             let has_t = found.iter().any(|(slot, _)| *slot == fields::T);
             let u = if has_t { None } else { snapshot.usable("u")?.map(doubles).transpose()? };
-            u.iter().try_for_each(|u| check(fields::T, "u", &Strided::packed(u), n))?;
+            u.iter().try_for_each(|u| check(fields::T, "u", &Strided::packed(u), (n, dim)))?;
             let energy = u.as_ref().map(|u| Offered::Each(Strided::packed(u)));
             self.state.accept(&Offer { domain, x, given: &given, energy, anew: false })?;
             self.state.time = snapshot.time.unwrap_or(self.state.time);
@@ -175,7 +179,7 @@ impl Solver {
         self.refuse_missing_functions(&notes)?;
         let array = |name: &str, like: usize| {
             let values = snapshot.usable(name)?.map(doubles).transpose()?;
-            values.map(|values| check(like, name, &Strided::packed(&values), n).map(|()| values)).transpose()
+            values.map(|values| check(like, name, &Strided::packed(&values), (n, dim)).map(|()| values)).transpose()
         };
         let last_h = array(restart::H_START, fields::H)?.unwrap_or_default();
         // Where particles move before anything is asked for, the search for h starts from those that were found.
@@ -217,6 +221,14 @@ fn in_space<'a>(v: &'a [f64], dim: usize, component: impl Fn(&[f64], usize) -> f
             *value = component(&v[k / 3 * dim..][..dim], k % 3);
         }
     })
+}
+
+/// The components of an array `b` of vectors.
+fn directions(snapshot: &Snapshot, frame: &Frame) -> Result<Vec<(usize, Vec<f64>)>> {
+    let Some(field) = snapshot.usable("b")?.filter(|f| f.components == 3) else { return Ok(Vec::new()) };
+    let values = field.data.to_f64()?;
+    let axes = (0..frame.dim()).filter_map(|axis| Some((fields::B + axis, frame.file_axis(axis)?)));
+    axes.map(|(slot, axis)| Ok((slot, memory::collected("b", values.chunks(3).map(|b| b[axis]))?))).collect()
 }
 
 fn doubles(field: &Field) -> Result<Vec<f64>> {

@@ -30,7 +30,7 @@ use crate::plan::given::{Offer, Offered};
 use crate::plan::report::Progress;
 use crate::plan::state::{Input, State};
 use crate::plan::{Choices, Plan, Report};
-use crate::space;
+use crate::space::{self, OTHER_UNITS, lengths, rule_of_lengths};
 use frame::Frame;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -130,7 +130,7 @@ impl Solver {
         let mut slots = Vec::new();
         for (name, values) in given {
             let slot = fields::slot(name)?;
-            check(slot, name, values, x.len())?;
+            check(slot, name, values, (x.len(), self.dim()))?;
             slots.push((slot, Offered::Each(*values)));
         }
         let domain = self.state.domain.clone();
@@ -166,7 +166,7 @@ impl Solver {
             let mut parts = Vec::new();
             for (component, &slot) in slots.iter().enumerate() {
                 let (name, part) = (FIELDS[slot].name, values.component(component));
-                check(slot, name, &part, self.len())?;
+                check(slot, name, &part, (self.len(), self.dim()))?;
                 parts.push((slot, Input::Each(self.state.cloud("set")?.inward(name, part, 0)?)));
             }
             // None of these can fail any more.
@@ -175,7 +175,7 @@ impl Solver {
         let energy = name == "u";
         let slot = if energy { fields::T } else { fields::slot(name)? };
         let cloud = self.state.cloud("set")?;
-        check(slot, name, &values, self.len())?;
+        check(slot, name, &values, (self.len(), self.dim()))?;
         let values = Input::Each(cloud.inward(name, values, 0)?);
         if energy { self.state.put_energy(values) } else { self.put(slot, values) }
     }
@@ -191,12 +191,15 @@ impl Solver {
             None if name == "u" => Some(Domain::Finite),
             None => match FIELDS[fields::slot(name)?].access {
                 Access::Input { domain, .. } => Some(domain),
-                Access::Output => None,
+                Access::Output { .. } => None,
             },
         };
         match domain {
             None => return Err(Error::bad("name", format!("'{name}'"), "it is a result, it cannot be set")),
             Some(domain) if !domain.holds(value) => return Err(Error::bad(name, value, domain.rule())),
+            Some(_) if name == "h" && !lengths(self.dim()).contains(&value) => {
+                return Err(Error::bad(name, value, &rule_of_lengths(self.dim(), OTHER_UNITS)));
+            }
             Some(_) => {}
         }
         match name {
@@ -292,13 +295,18 @@ impl Solver {
 }
 
 /// Whether an input has one value per particle, each of which makes sense.
-fn check(slot: fields::Slot, name: &str, values: &Strided, n: usize) -> Result<()> {
+fn check(slot: fields::Slot, name: &str, values: &Strided, (n, dim): (usize, usize)) -> Result<()> {
     expect(name, values.len(), n, "one value per particle")?;
     expect(name, values.components(), 1, "one component")?;
     match FIELDS[slot].access {
-        Access::Input { domain, .. } => values.check(name, domain.rule(), |v| domain.holds(v)),
-        Access::Output => Ok(()),
+        Access::Input { domain, .. } => values.check(name, domain.rule(), |v| domain.holds(v))?,
+        Access::Output { .. } => {}
     }
+    if slot != fields::H {
+        return Ok(());
+    }
+    let among = lengths(dim);
+    values.check(name, &rule_of_lengths(dim, OTHER_UNITS), |h| among.contains(&h))
 }
 
 pub(crate) fn expect(name: &str, got: usize, expected: usize, remedy: &str) -> Result<()> {

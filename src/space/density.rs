@@ -197,7 +197,8 @@ fn volume(kernel: &Kernel, weigh: Weigh, row: &Row, h: f64, count: &mut Count) -
     volume
 }
 
-fn are_equal(mass: &[f64]) -> bool {
+/// Whether one estimate is enough.
+pub fn are_equal(mass: &[f64]) -> bool {
     mass.iter().all(|&m| m == mass[0])
 }
 

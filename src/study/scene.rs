@@ -3,7 +3,7 @@
 use super::keys::explain;
 use crate::error::{Error, Result};
 use crate::io::{self, Encoding, Options};
-use crate::words::replaced;
+use crate::words::{Words, replaced};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::{Component, Path, PathBuf};
@@ -235,15 +235,15 @@ impl Scene {
         }
     }
 
-    /// Replaces a word of `words`, or adds it: `kernel=M4`.
+    /// Replaces words of `words`, or adds them: `kernel=M4 operator=kernel`.
     ///
     /// # Errors
-    /// `BadValue` unless it has the form `key=value`.
-    pub fn set_word(&mut self, word: &str) -> Result<()> {
-        if !word.split_once('=').is_some_and(|(key, value)| !key.is_empty() && !value.is_empty()) {
-            return Err(Error::bad("--set", format!("'{word}'"), "write key=value, like kernel=M4"));
+    /// `BadValue` unless each has the form `key=value`, and for a key that is given twice.
+    pub fn set_words(&mut self, words: &str) -> Result<()> {
+        if let Some(bare) = Words::parse("--set", words)?.bare() {
+            return Err(Error::bad("--set", format!("'{bare}'"), "write key=value, like kernel=M4"));
         }
-        self.words = replaced(&self.words, word, &[]);
+        self.words = replaced(&self.words, words, &[]);
         Ok(())
     }
 }
@@ -300,9 +300,9 @@ mod tests {
     #[test]
     fn words_are_replaced_or_added() {
         let mut scene = Scene::parse("a.toml", SMALL).unwrap();
-        scene.set_word("kernel=M4").unwrap();
-        scene.set_word("dim=2").unwrap();
+        scene.set_words("kernel=M4").unwrap();
+        scene.set_words("dim=2").unwrap();
         assert_eq!(scene.words, "heat kernel=M4 dim=2");
-        assert!(scene.set_word("kernel").is_err() && scene.set_word("=1").is_err());
+        assert!(scene.set_words("kernel").is_err() && scene.set_words("=1").is_err());
     }
 }

@@ -70,10 +70,10 @@ fn no_tolerance_is_no_control() {
 fn what_comes_unannounced_is_rejected_and_counted() {
     for method in names("integrators") {
         let x = lattice(20, 2, 0.0);
-        let mut s = unit_box(&format!("kernel=M4 integrator={method} tolerance=1e-4"), &x, 2, true);
+        let mut s = unit_box(&format!("kernel=M4 integrator={method} tolerance=1e-4 looks=0"), &x, 2, true);
         s.set_number("T", 1.0).unwrap();
         let hot: Vec<bool> = x.chunks(2).map(|p| p[0] < 0.5).collect();
-        // Nothing happens at the beginning: the first guess is the whole step.
+        // Nothing happens at the beginning, and nobody looks ahead: the first guess is the whole step.
         s.set_source_callback(Some(Box::new(move |time, particles, _, source| {
             let power = 1e3 * time * time;
             source.iter_mut().zip(particles).for_each(|(s, i)| *s = if hot[*i as usize] { power } else { 0.0 });

@@ -3,6 +3,7 @@
 
 use crate::particles::*;
 use diffusph::Solver;
+use diffusph::error::Error;
 use diffusph::integrator::METHODS;
 use nalgebra::{DMatrix, DVector};
 use std::f64::consts::PI;
@@ -400,5 +401,118 @@ fn implicit_steps_keep_what_they_may_cost() {
         // Or what was amiss with the sub-steps that it did try.
         assert!(["STEP_TOO_LARGE", "OUT_OF_BOUNDS"].contains(&error.name()), "{method}: {error}");
         assert_eq!(bits(&s.get_all("T").unwrap()), bits(&start));
+    }
+}
+
+/// What a pulse of the host's does within one step of `limits` explicit limits: what came in, T and how often it was asked.
+fn pulsed(words: &str, limits: f64, on: [f64; 2], what: &str) -> Result<(f64, Vec<f64>, f64), Error> {
+    let x = lattice(16, 2, 0.2);
+    let mut s = unit_box(&format!("kernel=M4 {words}"), &x, 2, true);
+    let mut lens = unit_box("kernel=M4", &x, 2, true);
+    lens.set_number("T", 0.0).unwrap();
+    let dt = limits * lens.limit().unwrap();
+    let is_on = move |time: f64| time > on[0] * dt && time < on[1] * dt;
+    if what == "source" {
+        s.set_number("T", 0.0).unwrap();
+        s.set_source_callback(Some(Box::new(move |time, _, _, source| {
+            source.fill(if is_on(time) { 1.0 / dt } else { 0.0 });
+            0
+        })));
+    } else {
+        set(&mut s, "T", &field(&x, 2, |p| (2.0 * PI * p[0]).sin()));
+        s.set_kappa_callback(Some(Box::new(move |time, _, _, kappa| {
+            kappa.fill(if is_on(time) { 1.0 } else { 0.0 });
+            0
+        })));
+    }
+    let report = s.step(dt)?;
+    Ok((report.heat_source, s.get_all("T").unwrap(), dt))
+}
+
+#[test]
+fn heat_that_comes_and_goes_within_a_step_is_not_lost() {
+    for method in names("integrators") {
+        for limits in [0.5, 2.0, 300.0] {
+            for on in [[0.41, 0.6], [0.15, 0.29], [0.85, 0.99], [0.3, 1.1]] {
+                let came = |words: &str| {
+                    pulsed(&format!("integrator={method} {words}"), limits, on, "source").map(|(heat, ..)| heat)
+                };
+                let right = on[1].min(1.0) - on[0];
+                // An edge is found to 1/4096 of the step, and errors of 1e-3 are none.
+                for words in ["", "tolerance=1e-5"] {
+                    let heat = came(words).unwrap_or_else(|e| panic!("{method} {words} {limits} {on:?}: {e}"));
+                    assert!((heat - right).abs() < 4e-3, "{method} {words} {limits} {on:?}: {heat} for {right}");
+                }
+            }
+        }
+    }
+    // What stages alone see of it.
+    let lost = pulsed("integrator=rkl2 looks=0", 0.5, [0.41, 0.6], "source").unwrap();
+    assert_eq!(lost.0, 0.0);
+}
+
+#[test]
+fn a_layer_that_conducts_for_a_while_does_so() {
+    for (method, limits) in [("auto", 0.5), ("auto", 50.0), ("rk4", 2.0), ("sdirk2", 50.0), ("crank-nicolson", 5.0)] {
+        for on in [[0.41, 0.6], [0.15, 0.29]] {
+            let words = format!("integrator={method} mean=arithmetic");
+            let (_, t, dt) = pulsed(&words, limits, on, "kappa").unwrap();
+            // The same without a pulse: a step as long as it, of a kappa that stays.
+            let x = lattice(16, 2, 0.2);
+            let mut s = unit_box("kernel=M4 integrator=rk4 tolerance=1e-8 mean=arithmetic", &x, 2, true);
+            let start = field(&x, 2, |p| (2.0 * PI * p[0]).sin());
+            set(&mut s, "T", &start);
+            s.step((on[1] - on[0]) * dt).unwrap();
+            let right = s.get_all("T").unwrap();
+            let rms = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt();
+            let (off, moved) = (rms(&t, &right), rms(&start, &right));
+            assert!(
+                off < 0.02 * moved + 3e-3 * rms(&start, &vec![0.0; start.len()]),
+                "{method} {limits} {on:?}: {off} of {moved}"
+            );
+        }
+    }
+    let (_, t, _) = pulsed("integrator=rkl2 looks=0", 0.5, [0.41, 0.6], "kappa").unwrap();
+    assert_eq!(t[0], field(&lattice(16, 2, 0.2), 2, |p| (2.0 * PI * p[0]).sin())[0]);
+}
+
+#[test]
+fn a_source_that_switches_on_in_a_uniform_body_is_followed() {
+    for method in names("integrators") {
+        for from in [0.0, 300.0] {
+            let x = lattice(12, 2, 0.2);
+            let mut s = unit_box(&format!("kernel=M4 integrator={method} tolerance=1e-3"), &x, 2, true);
+            s.set_number("T", from).unwrap();
+            s.set_source_callback(Some(Box::new(move |time, _, _, source| {
+                source.fill(if time < 0.37 { 0.0 } else { 2.0 });
+                0
+            })));
+            let report = s.step(1.0).unwrap_or_else(|e| panic!("{method} from {from}: {e}"));
+            assert!((report.heat_source - 1.26).abs() < 5e-3, "{method}: {report:?}");
+        }
+    }
+}
+
+/// Stiff, and hardly uneven: rounding of T must not be what is solved for.
+#[test]
+fn small_differences_of_large_temperatures_are_as_right_as_by_themselves() {
+    for method in ["auto", "rkl2", "sdirk2", "backward-euler"] {
+        for limits in [1e2, 1e6, 1e8] {
+            let of = |offset: f64, size: f64| {
+                let x = lattice(16, 2, 0.2);
+                let mut s = unit_box(&format!("kernel=M4 integrator={method}"), &x, 2, true);
+                set(&mut s, "kappa", &field(&x, 2, |p| if p[0] < 0.5 { 1.0 } else { 1e6 }));
+                set(&mut s, "T", &field(&x, 2, |p| offset + size * (2.0 * PI * p[1]).cos()));
+                set(&mut s, "fixed", &field(&x, 2, |p| f64::from(u8::from(p[1] < 0.1))));
+                let dt = limits * s.limit().unwrap();
+                let report = s.step(dt).map(|_| ());
+                (report.is_ok(), s.get_all("T").unwrap().iter().map(|t| (t - offset) / size).collect::<Vec<_>>())
+            };
+            let (alone, on_top) = (of(0.0, 1.0), of(300.0, 1e-6));
+            assert_eq!(alone.0, on_top.0, "{method} {limits}");
+            let off = alone.1.iter().zip(&on_top.1).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+            // 300 holds 1e-6 to 6e-8 of it at the beginning, and again at the end.
+            assert!(off < 1e-6, "{method} {limits}: {off:e}");
+        }
     }
 }

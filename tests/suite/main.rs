@@ -11,6 +11,7 @@ mod boundaries;
 mod c_examples;
 mod consistent;
 mod disorder;
+mod extremes;
 mod files;
 mod floors;
 mod fortran;

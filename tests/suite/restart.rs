@@ -380,3 +380,49 @@ fn a_step_that_fails_leaves_the_plan_as_it_was_and_a_file_without_particles_chan
     assert!(s.set_snapshot(&empty).unwrap_err().to_string().contains("no particles"));
     assert_eq!(s.len(), x.len() / 2);
 }
+
+/// One array of another program's, instead of T.
+fn with_array(name: &str, components: usize, values: Vec<f64>) -> Snapshot {
+    let named = Field { name: name.into(), components, data: Data::F64(values) };
+    Snapshot { fields: vec![named], ..plane([0, 2], 5.0) }
+}
+
+#[test]
+fn energies_of_another_program_s_file_are_temperatures_as_a_host_s_are() {
+    let u: Vec<f64> = (0..100).map(|i| 3.0 + f64::from(i % 7)).collect();
+    let c_v: Vec<f64> = (0..100).map(|i| 1.0 + f64::from(i % 3)).collect();
+    let t: Vec<f64> = u.iter().zip(&c_v).map(|(u, c_v)| u / c_v).collect();
+    // c_v before, in the file, or after.
+    let mut file = with_array("u", 1, u.clone());
+    let mut before = Solver::new("heat dim=2").unwrap();
+    before.set_snapshot(&plane([0, 2], 5.0)).unwrap();
+    set(&mut before, "c_v", &c_v);
+    before.set_snapshot(&file).unwrap();
+    assert_eq!((before.get_all("T").unwrap(), before.get_all("u").unwrap()), (t.clone(), u.clone()));
+    let mut after = Solver::new("heat dim=2").unwrap();
+    after.set_snapshot(&file).unwrap();
+    assert_eq!(after.get_all("T").unwrap(), u);
+    set(&mut after, "c_v", &c_v);
+    assert_eq!(after.get_all("T").unwrap(), t);
+    file.fields.push(Field { name: "c_v".into(), components: 1, data: Data::F64(c_v.clone()) });
+    let mut inside = planar(&file, "dim=2").unwrap();
+    assert_eq!(inside.get_all("T").unwrap(), t);
+    inside.step(1e-3).unwrap();
+    assert!(inside.get_all("T").unwrap() != t);
+    // T that moved gives way to a new u, and to nothing but a number.
+    inside.set_snapshot(&file).unwrap();
+    assert_eq!(inside.get_all("T").unwrap(), t);
+    let mut wrong = with_array("u", 1, u);
+    wrong.fields[0].data = Data::F64(vec![f64::MAX; 100]);
+    set(&mut inside, "c_v", &vec![1e-3; 100]);
+    assert!(inside.set_snapshot(&wrong).is_err_and(|e| e.to_string().contains("u[0]")));
+    assert_eq!(inside.get_all("T").unwrap(), t.iter().zip(&c_v).map(|(t, c)| t * c / 1e-3).collect::<Vec<_>>());
+}
+
+#[test]
+fn directions_of_another_program_s_file_are_taken_along_the_axes_that_there_are() {
+    let b: Vec<f64> = (0..100).flat_map(|i| [1.0, 99.0, f64::from(i)]).collect();
+    let mut s = Solver::new("heat dim=2 operator=two-first").unwrap();
+    s.set_snapshot(&with_array("b", 3, b)).unwrap();
+    assert_eq!(s.get_all("b").unwrap(), (0..100).flat_map(|i| [1.0, f64::from(i)]).collect::<Vec<_>>());
+}

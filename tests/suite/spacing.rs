@@ -288,3 +288,116 @@ fn operators_that_are_wrong_in_one_layer_are_refused_there() {
         s.get_all("dT_dt").unwrap();
     }
 }
+
+/// Refused with this name and these words.
+fn refused(s: &mut Solver, name: &str, has: &str) -> bool {
+    s.set_number("T", 0.0).unwrap();
+    let refused = |e: diffusph::error::Error| e.name() == name && e.to_string().contains(has);
+    s.step(1e-6).is_err_and(refused)
+}
+
+#[test]
+fn supports_that_end_before_the_next_neighbour_in_a_direction_are_refused() {
+    for kernel in ["M4", "M6", "C2"] {
+        for (spacing, jitter) in [([8.0, 1.0], 0.0), ([8.0, 1.0], 0.1), ([1.0, 10.0], 0.1), ([12.0, 1.0], 0.1)] {
+            let count = if spacing[0] > spacing[1] { [16, 100] } else { [100, 16] };
+            for periodic in [true, false] {
+                let words = |more: &str| format!("kernel={kernel} {more}");
+                let mut s = grid(&words(""), &count, &spacing, jitter, &[periodic; 2]).0;
+                assert!(refused(&mut s, "BAD_VALUE", "larger h_fac"), "{kernel} {spacing:?} {jitter}");
+                // What it says does help: with it, the wide direction conducts.
+                let own = if kernel == "M6" { 3.0 } else { 4.0 };
+                let wide = usize::from(spacing[1] > spacing[0]);
+                if periodic && jitter == 0.0 {
+                    let (mut s, x) = grid(&words(&format!("h_fac={own}")), &count, &spacing, jitter, &[periodic; 2]);
+                    let conducts = conducted(&mut s, &x, 2, wide, 16.0 * spacing[wide]);
+                    assert!((conducts - 1.0).abs() < 0.1, "{kernel} {conducts}");
+                }
+                assert!(!refused(
+                    &mut grid(&words("allow=volumes"), &count, &spacing, jitter, &[periodic; 2]).0,
+                    "BAD_VALUE",
+                    ""
+                ));
+            }
+        }
+        // Spacing that kernels see, thin bodies, and noise of any kind are not refused.
+        for (spacing, jitter) in [([1.0, 1.0], 0.45), ([3.0, 1.0], 0.0), ([3.0, 1.0], 0.3), ([4.0, 1.0], 0.0)] {
+            let mut s = grid(&format!("kernel={kernel}"), &[30, 30], &spacing, jitter, &[false; 2]).0;
+            assert!(!refused(&mut s, "BAD_VALUE", ""), "{kernel} {spacing:?} {jitter}");
+        }
+    }
+}
+
+#[test]
+fn densities_that_are_summed_over_squeezed_neighbours_are_refused() {
+    let summed = |words: &str, count: &[usize], spacing: &[f64], jitter: f64| {
+        let dim = count.len();
+        let (given, x) = grid(words, count, spacing, jitter, &vec![true; dim]);
+        drop(given);
+        let length: Vec<f64> = count.iter().zip(spacing).map(|(n, d)| *n as f64 * d).collect();
+        let mut s = Solver::new(&format!("heat dim={dim} {words}")).unwrap();
+        s.set_box(&vec![0.0; dim], &length, &vec![true; dim]).unwrap();
+        s.set_particles(Strided::new("x", &x, x.len() / dim, dim, dim).unwrap()).unwrap();
+        for (name, value) in [("m", spacing.iter().product()), ("kappa", 1.0)] {
+            s.set_number(name, value).unwrap();
+        }
+        s
+    };
+    for kernel in ["M4", "M6"] {
+        for (count, spacing, jitter) in [
+            (&[20, 60][..], &[4.0, 1.0][..], 0.0),
+            (&[20, 60], &[5.0, 1.0], 0.2),
+            (&[20, 60], &[8.0, 1.0], 0.1),
+            (&[10, 24, 24], &[4.0, 1.0, 1.0], 0.1),
+            (&[6, 6, 80], &[20.0, 20.0, 1.0], 0.0),
+        ] {
+            let words = format!("kernel={kernel}");
+            assert!(
+                refused(&mut summed(&words, count, spacing, jitter), "BAD_VALUE", "give rho"),
+                "{words} {spacing:?}"
+            );
+            let mut insisted = summed(&format!("{words} allow=volumes"), count, spacing, jitter);
+            let rho = insisted.get_all("rho").unwrap();
+            let mean = rho.iter().sum::<f64>() / rho.len() as f64;
+            // It is as wrong as the message has it.
+            assert!(!refused(&mut insisted, "BAD_VALUE", "") && mean > 1.15, "{words} {spacing:?}: {mean}");
+        }
+        // Lattices that are hardly squeezed, and uniformly random points.
+        for (count, spacing, jitter) in [(&[20, 40][..], &[2.0, 1.0][..], 0.1), (&[10, 10, 10], &[1.0; 3], 0.5)] {
+            let mut s = summed(&format!("kernel={kernel}"), count, spacing, jitter);
+            assert!(!refused(&mut s, "BAD_VALUE", ""), "{kernel} {spacing:?}");
+        }
+    }
+}
+
+#[test]
+fn tilted_and_bent_bodies_of_one_layer_are_refused_by_operators_that_need_more() {
+    let (turn, n) = (0.5f64, 20);
+    let jittered = |random: &mut Random, size: f64| size * random.next();
+    for jitter in [0.0, 0.2] {
+        let mut random = Random(3);
+        let sheet: Vec<f64> = (0..n * n)
+            .flat_map(|p| {
+                let at = [(p % n) as f64, (p / n) as f64, 0.0].map(|v| v + jittered(&mut random, jitter));
+                [at[0] * turn.cos() - at[2] * turn.sin(), at[1], at[0] * turn.sin() + at[2] * turn.cos()]
+            })
+            .collect();
+        let ring: Vec<f64> = (0..60)
+            .flat_map(|k| {
+                let (angle, r) = (k as f64 * PI / 30.0, 60.0 / (2.0 * PI) + jittered(&mut random, jitter));
+                [r * angle.cos(), r * angle.sin()]
+            })
+            .collect();
+        for (x, dim) in [(&sheet, 3), (&ring, 2)] {
+            for operator in ["monotone", "two-first", "limited", "brookshaw", "projected"] {
+                let mut s = Solver::new(&format!("heat dim={dim} operator={operator}")).unwrap();
+                s.set_particles(Strided::new("x", x, x.len() / dim, dim, dim).unwrap()).unwrap();
+                for (name, value) in [("m", 1.0), ("rho", 1.0), ("kappa", 1.0)] {
+                    s.set_number(name, value).unwrap();
+                }
+                let thin = refused(&mut s, "BAD_VALUE", "half a spacing thick");
+                assert_eq!(thin, !["brookshaw", "projected"].contains(&operator), "{operator} {dim}-D {jitter}");
+            }
+        }
+    }
+}
