@@ -1,4 +1,4 @@
-# Installs the library for C, C++ and Fortran hosts, as any C library is installed:
+# Installs the library for C, C++, Fortran and Python hosts, as any C library is installed:
 #
 #     cargo build --release
 #     cmake -DPREFIX=/usr/local -P include/install.cmake
@@ -39,7 +39,7 @@ foreach(file libdiffusph.so libdiffusph.a)
     endif()
 endforeach()
 
-file(INSTALL "${root}/include/diffusph.h" "${root}/include/diffusph.f90" DESTINATION "${to}/include")
+file(INSTALL "${root}/include/diffusph.h" "${root}/include/diffusph.f90" "${root}/include/diffusph.py" DESTINATION "${to}/include")
 configure_file("${FROM}/libdiffusph.so" "${to}/lib/${shared}" COPYONLY)
 file(CREATE_LINK "${shared}" "${to}/lib/libdiffusph.so.${ABI}" SYMBOLIC)
 file(CREATE_LINK "libdiffusph.so.${ABI}" "${to}/lib/libdiffusph.so" SYMBOLIC)

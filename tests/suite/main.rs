@@ -26,6 +26,8 @@ mod nonlinear;
 #[cfg(feature = "cli")]
 mod program;
 mod projected;
+#[cfg(feature = "cli")]
+mod python;
 mod queries;
 mod restart;
 mod rules;
