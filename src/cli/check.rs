@@ -43,7 +43,7 @@ pub fn text(path: &Path) -> Result<String> {
         line("spacing", format!("nearest neighbour {mean:.4e} on average, {least:.4e} at least{note}"));
     }
     for field in &snapshot.fields {
-        line(&field.name, describe(field));
+        line(&field.name, describe(field, snapshot.field("T").is_some()));
     }
     for LeftAside { name, reason } in &snapshot.left_aside {
         line(name, format!("left aside: {reason}"));
@@ -73,9 +73,11 @@ fn one_line(text: &str) -> String {
 /// The most characters that are shown of a text.
 const LONGEST: usize = 200;
 
-fn describe(field: &Field) -> String {
+fn describe(field: &Field, has_t: bool) -> String {
     let kind = format!("{} x {}", field.components, field.data.type_name());
     let role = match FIELDS.iter().find(|f| f.name == field.name).map(|f| f.access) {
+        _ if field.name == "u" && field.components == 1 && !has_t => "taken: T is u / c_v",
+        _ if field.name == "b" && field.components == 3 => "taken",
         Some(Access::Input { .. }) if field.components == 1 => "taken",
         Some(Access::Input { .. }) => "left aside: a quantity has one component",
         _ => "left aside",
@@ -89,7 +91,8 @@ fn describe(field: &Field) -> String {
 /// What must still be given before it can run, and which arrays may be it.
 fn missing(snapshot: &Snapshot) -> String {
     let given = |name: &&str| snapshot.field(name).is_some_and(|f| f.components == 1);
-    let absent: Vec<&str> = ["m", "T", "kappa"].into_iter().filter(|name| !given(name)).collect();
+    let absent = ["m", "T", "kappa"].into_iter().filter(|name| !(given(name) || (*name == "T" && given(&"u"))));
+    let absent: Vec<&str> = absent.collect();
     let hint = |name: &&str| {
         let meant = snapshot.fields.iter().find(|f| f.components == 1 && may_be(&f.name, name))?;
         Some(format!("; perhaps {name} = {:?}", one_line(&meant.name)))

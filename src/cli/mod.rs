@@ -6,6 +6,7 @@
 mod check;
 mod interrupt;
 mod list;
+mod look;
 mod progress;
 mod study;
 
@@ -40,6 +41,9 @@ enum Command {
         /// Folder under which the scene's output goes
         #[arg(long, value_name = "DIR", default_value = ".")]
         out: PathBuf,
+        /// Go on from the last snapshot there, to the same bits as without an interruption
+        #[arg(long = "continue")]
+        resume: bool,
     },
     /// Show what a run of a scene will do, and what it leaves out and why
     Plan {
@@ -58,6 +62,20 @@ enum Command {
     Check {
         /// A .vtu, .vtp, .pvtu, .pvtp or legacy .vtk file
         file: PathBuf,
+    },
+    /// Draw a quantity of a particle file, or of the last snapshot of a .pvd, as .svg
+    Look {
+        /// A file that 'check' takes, or a .pvd
+        file: PathBuf,
+        /// What to draw; of vectors their length
+        #[arg(long, value_name = "NAME", default_value = "T")]
+        field: String,
+        /// Where three dimensions are cut along their third axis (default: the middle)
+        #[arg(long, value_name = "PLACE", allow_negative_numbers = true)]
+        at: Option<f64>,
+        /// Where to (default: beside the file)
+        #[arg(long, value_name = "FILE.svg")]
+        out: Option<PathBuf>,
     },
     /// Measure accuracy, cost or stability ('list studies' shows how); exit code 1 where something is not as it should be
     Study(study::StudyArgs),
@@ -95,10 +113,13 @@ pub fn main() -> ExitCode {
         error.exit()
     });
     let done = match program.command {
-        Command::Run { scene, json, out } => run(&scene, json, &out).map(success),
+        Command::Run { scene, json, out, resume } => run(&scene, json, &out, resume).map(success),
         Command::Plan { scene } => scene.study().and_then(|mut study| print(study.plan()?.to_string())).map(success),
         Command::List { name } => list::text(name.as_deref()).and_then(print).map(success),
         Command::Check { file } => check::text(&file).and_then(print).map(success),
+        Command::Look { file, field, at, out } => {
+            look::draw(&look::Look { file: &file, field: &field, at, out: out.as_deref() }).and_then(print).map(success)
+        }
         Command::Study(args) => study::run(&args),
     };
     match done {
@@ -119,8 +140,11 @@ fn success((): ()) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-fn run(args: &SceneArgs, json: bool, out: &Path) -> Result<()> {
-    let study = args.study()?;
+fn run(args: &SceneArgs, json: bool, out: &Path, resume: bool) -> Result<()> {
+    let mut study = args.study()?;
+    if resume {
+        study = study.resumed(out)?;
+    }
     interrupt::listen();
     let report = study.run(out, progress::watch())?;
     if json {

@@ -19,6 +19,9 @@ use std::time::Instant;
 /// symmetric scatter by less.
 const GROWS: f64 = 1e-3;
 
+/// How far beyond the largest Ritz value of Arnoldi's method an eigenvalue may be.
+const BEYOND_ARNOLDI: f64 = 1.05;
+
 /// Explicit limits from which it is worth one rate to see whether anything changes at all.
 const WORTH_A_LOOK: f64 = 8.0;
 
@@ -440,8 +443,13 @@ impl Motion<'_> {
         }
         let weight = self.linearise_about(time, t)?;
         let symmetric = self.choices.operator.conserves && self.heat.engine.is_linear();
-        let spectral =
+        let mut spectral =
             spectrum::largest(self.pool, &weight, proven.spectral, symmetric, |x, y| self.heat.linear(x, y))?;
+        if !symmetric {
+            // Each may miss what the other sees.
+            let (_, fastest) = arnoldi::rightmost(self.pool, &weight, |x, y| self.heat.linear(x, y))?;
+            spectral = spectral.max(BEYOND_ARNOLDI * fastest).min(proven.spectral);
+        }
         Ok(Bounds { spectral: spectral.max(floor), ..proven })
     }
 

@@ -6,6 +6,7 @@
 
 use super::state::{Input, State};
 use crate::error::{Error, Result};
+use crate::kernel::Kernel;
 use crate::memory;
 use crate::model::fields;
 use crate::operator::{Matrix, Normalise, tensor};
@@ -18,96 +19,153 @@ const SAMPLE: usize = 1024;
 /// Fewest that say anything.
 const FEWEST: usize = 10;
 
-/// What a direction has less of than others where it is hardly seen: of Σ V W d², relative to the largest. Poisson clouds have
-/// 0.5 at the median and less than 0.3 at 4 to 16 % of the particles, as lattices squeezed 3:1 have in 2-D; squeezed 4:1, and
-/// 3:1 in 3-D, 30 to 100 %, and summed densities are then off by a fifth and more.
+/// How round a particle's surroundings are: the least of Σ V W d² over directions, relative to the largest. Sheets and strings
+/// of one layer with 30 % jitter have 0 to 0.04, of two layers 0.5, Poisson clouds 0.5 at the median.
+const FLAT: f64 = 0.15;
+/// Hardly seen, and the share of particles of which that is too much: it is 4 to 16 % in Poisson clouds, and 30 to 100 % in
+/// lattices squeezed 4:1, and 3:1 in 3-D, where summed densities are off by a fifth and more.
 const THIN: f64 = 0.3;
 const MOST_THIN: f64 = 0.2;
-/// The same at the median of sheets and strings: 0 to 0.04 with one layer and 30 % jitter, 0.5 with two.
-const FLAT: f64 = 0.15;
+/// The roundness of all surroundings together, away from surfaces: 0.97 in Poisson clouds, 0.8 in bodies of three layers and
+/// 0.6 of two. Lattices squeezed 2:1 have 0.53 to 0.87, and 1.03 of their density; where it is less, or disorder makes single
+/// particles see by far less than all together, 1.07 to 2.5.
+const LEAST_ROUND: f64 = 0.5;
+const LEAST_ROUND_OF_DISORDER: f64 = 0.75;
+const DISORDER: f64 = 0.87;
+/// Length of Σ V W d/h beyond which a particle is at a surface.
+const INSIDE: f64 = 0.25;
+
 /// What a particle conducts at least in its worst direction, and by how much more than fill it its neighbours' volumes may.
 /// Both are missed by 0 to 2 % of Poisson clouds and others with noise, by 9 to 90 % of lattices squeezed 6:1 and more, and by
 /// 6 % of particles graded 10:1 along each axis, whose modes converge all the same.
 const CONDUCTS: f64 = 0.3;
 const OVERFULL: f64 = 1.1;
 const MOST_LACKING: f64 = 0.08;
+/// What those that are overfull conduct together, if they are this share.
+const CONDUCT: f64 = 0.7;
+const MANY: f64 = 0.2;
+
+/// The share of Σ V W that a particle and what is nearer than a quarter of its size may make where that is full: with
+/// neighbours that are all in pairs it is 0.9, in Poisson clouds of one dimension 0.75 and more at one particle in ten.
+const FULL: f64 = 1.02;
+const ALONE: f64 = 0.75;
+const NEAR: f64 = 0.25;
+const MOST_ALONE: f64 = 0.25;
 
 /// What one particle sees.
 struct Seen {
     i: usize,
-    /// The least of Σ V W d² over directions, relative to the largest.
-    roundness: f64,
-    /// Σ V W
+    /// Σ V W d dᵀ/h²
+    around: Matrix3<f64>,
+    /// Σ V w d dᵀ/2, w the operator's weights: I where it is right.
+    conducts: Matrix3<f64>,
+    /// Σ V W, of it the particle's own and what is near, and the length of Σ V W d/h.
     filled: f64,
-    /// The least of Σ V w d²/2 over directions, w the operator's weights: 1 where it is right.
-    conducts: f64,
+    own: f64,
+    near: f64,
+    aside: f64,
+}
+
+/// What is to be found out.
+struct Wanted {
+    /// The operator needs thickness.
+    thick: bool,
+    /// rho is summed.
+    summed: bool,
+    /// Particles should conduct alike in all directions that they have.
+    even: bool,
 }
 
 impl State {
     /// Refuses clouds in which kernels do not reach the neighbours in every direction that there is.
     pub(super) fn refuse_what_is_not_seen(&self, matrix: &Matrix) -> Result<()> {
-        let summed = self.inputs[fields::RHO] == Input::Unset;
+        let (operator, allow) = (self.choices.operator, self.choices.allow);
         let isotropic = self.directions.as_ref().is_none_or(|d| d.shape.is_empty());
-        let by_tensor = self.choices.normalise == Normalise::Tensor && self.choices.operator.is_one_matrix();
-        let tensor = by_tensor && isotropic;
-        let insisted = self.choices.allow.volumes || self.choices.allow.flat;
-        let thick = self.needs_thickness();
-        if self.dim() == 1 || self.len() < FEWEST || !(thick || ((summed || tensor) && !insisted)) {
+        let one_matrix = self.choices.normalise == Normalise::Tensor && operator.is_one_matrix();
+        let insisted = allow.volumes || allow.flat;
+        let summed = self.inputs[fields::RHO] == Input::Unset;
+        let wanted = Wanted {
+            thick: self.needs_thickness() && self.dim() > 1,
+            summed: summed && self.dim() > 1 && !insisted,
+            even: !summed && isotropic && (one_matrix || operator.is_exact()) && self.dim() > 1 && !insisted,
+        };
+        if self.len() < FEWEST || (insisted && !wanted.thick) {
             return Ok(());
         }
         let seen = self.with_rows(|rows| self.look_around(rows, matrix))?;
-        if thick && median(seen.iter().map(|s| s.roundness)) < FLAT {
+        let dim = self.dim();
+        if wanted.thick && median(seen.iter().map(|s| s.roundness(dim))) < FLAT {
             return Err(self.too_thin("one direction"));
         }
-        if insisted {
+        if wanted.summed {
+            self.refuse_wrong_sums(&seen)?;
+        }
+        if wanted.even {
+            self.refuse_what_does_not_conduct(&seen)?;
+        }
+        if insisted { Ok(()) } else { self.refuse_what_sees_itself(&seen) }
+    }
+
+    fn refuse_wrong_sums(&self, seen: &[Seen]) -> Result<()> {
+        let dim = self.dim();
+        let thin = share(seen, |s| s.roundness(dim) < THIN);
+        let inside: Vec<&Seen> = seen.iter().filter(|s| s.aside < INSIDE).collect();
+        let together = inside.iter().map(|s| s.around).sum::<Matrix3<f64>>();
+        let (round, single) = (roundness(&together, dim), median(inside.iter().map(|s| s.roundness(dim))));
+        let disordered = single < DISORDER * round && round < LEAST_ROUND_OF_DISORDER;
+        let few = 3 * inside.len() < seen.len();
+        if thin <= MOST_THIN && (few || (round >= LEAST_ROUND && !disordered)) {
             return Ok(());
         }
-        let worst = seen.iter().min_by(|a, b| a.roundness.total_cmp(&b.roundness));
-        let thin = share(&seen, |s| s.roundness < THIN);
-        if let Some(worst) = worst.filter(|_| summed && thin > MOST_THIN) {
-            let value = format!(
-                "summed over neighbours that leave a direction empty, as {:.0} % of the particles do",
-                100.0 * thin
-            );
-            let rule = "it is a fifth and more off there: give rho, or a larger h_fac where spacing differs by direction, or \
-                        insist with allow=volumes";
-            return Err(Error::bad_at("rho", self.host(worst.i), value, rule));
+        let worst = seen.iter().min_by(|a, b| a.roundness(dim).total_cmp(&b.roundness(dim)));
+        let value = format!(
+            "summed over neighbours that are not all around: in one direction there is {:.0} % of what there is in another",
+            100.0 * round.min(median(seen.iter().map(|s| s.roundness(dim))))
+        );
+        let rule = "it may be a fifth and more off: give rho, or a larger h_fac where spacing differs by direction, or insist \
+                    with allow=volumes";
+        Err(Error::bad_at("rho", self.host(worst.map_or(0, |s| s.i)), value, rule))
+    }
+
+    fn refuse_what_does_not_conduct(&self, seen: &[Seen]) -> Result<()> {
+        let least = |conducts: &Matrix3<f64>| extremes(conducts, self.dim()).0;
+        let overfull: Vec<&Seen> = seen.iter().filter(|s| s.filled > OVERFULL).collect();
+        let lacking = share(seen, |s| s.filled > OVERFULL && least(&s.conducts) < CONDUCTS);
+        let together = overfull.iter().map(|s| s.conducts).sum::<Matrix3<f64>>() / overfull.len().max(1) as f64;
+        let many = overfull.len() as f64 > MANY * seen.len() as f64;
+        if lacking <= MOST_LACKING && !(many && least(&together) < CONDUCT) {
+            return Ok(());
         }
-        let lacks = |s: &Seen| s.conducts < CONDUCTS && s.filled > OVERFULL;
-        let lacking = share(&seen, lacks);
-        if let Some(first) = seen.iter().find(|s| lacks(s)).filter(|_| tensor && !summed && lacking > MOST_LACKING) {
-            let value = format!("too short, as that of {:.0} % of the particles", 100.0 * lacking);
-            let rule = format!(
-                "in one direction it has hardly a neighbour, though volumes m/rho reach that far, and conducts {:.2} of what it \
-                 should: give a larger h_fac, h, or more particles, or insist with allow=volumes",
-                first.conducts.max(0.0)
-            );
-            return Err(Error::bad_at("h", self.host(first.i), value, &rule));
-        }
-        Ok(())
+        let worst = overfull.iter().min_by(|a, b| least(&a.conducts).total_cmp(&least(&b.conducts)));
+        let (i, conducts) = worst.map_or((0, 0.0), |s| (s.i, least(&s.conducts)));
+        let rule = format!(
+            "in one direction it has hardly a neighbour, though volumes m/rho reach that far, and conducts {:.2} of what it \
+             should, {:.2} with the others: give a larger h_fac, h, or more particles, or insist with allow=volumes",
+            conducts.max(0.0),
+            least(&together).max(0.0)
+        );
+        Err(Error::bad_at("h", self.host(i), "too short for the spacing", &rule))
+    }
+
+    fn refuse_what_sees_itself(&self, seen: &[Seen]) -> Result<()> {
+        let alone = |s: &Seen| s.near > s.own && s.near > ALONE * s.filled && s.filled > FULL;
+        let Some(first) = seen.iter().find(|s| alone(s)).filter(|_| share(seen, alone) > MOST_ALONE) else {
+            return Ok(());
+        };
+        let value = format!("too short, as that of {:.0} % of the particles", 100.0 * share(seen, alone));
+        let rule = "it sees hardly more than itself and what is in the same place, and what is around it too far: give a larger \
+                    h_fac or h, one particle in each place, or insist with allow=volumes";
+        Err(Error::bad_at("h", self.host(first.i), value, rule))
     }
 
     fn look_around(&self, rows: &Rows, matrix: &Matrix) -> Result<Vec<Seen>> {
-        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
         let (n, kernel) = (self.len(), &self.choices.kernel);
+        let volume = self.geometry.as_ref().map_or(&[][..], |g| &g.volume);
         let count = n.min(SAMPLE);
         let one = |k: usize| {
             let (i, mut seen) = (k * n / count, None);
             rows.visit(i..i + 1, &mut Scratch::default(), |row| {
-                let h = rows.h[i];
-                let q = memory::collected("a sample", row.r.iter().map(|r| r / h))?;
-                let mut w = memory::filled("a sample", q.len(), 0.0)?;
-                kernel.w(&q, &mut w);
-                let unit = h.powi(-(kernel.dim() as i32));
-                w.iter_mut().zip(row.j).for_each(|(w, &j)| *w *= volume[j as usize] * unit);
-                let (least, most) = extremes(&row, kernel.dim(), &w);
-                let scale = 0.5 / volume[i];
-                seen = Some(Seen {
-                    i,
-                    roundness: if most > 0.0 { least / most } else { 0.0 },
-                    filled: volume[i] * unit * kernel.w_at(0.0) + w.iter().sum::<f64>(),
-                    conducts: scale * extremes(&row, kernel.dim(), matrix.coefficients(i)).0,
-                });
+                seen = Some(Seen::of(kernel, &row, rows.h[i], volume, matrix.coefficients(i))?);
                 Ok(())
             })?;
             Ok(seen)
@@ -117,21 +175,60 @@ impl State {
     }
 }
 
-/// The least and the largest of Σ weight d² over directions.
-fn extremes(row: &Row, dim: usize, weight: &[f64]) -> (f64, f64) {
+impl Seen {
+    fn of(kernel: &Kernel, row: &Row, h: f64, volume: &[f64], coefficients: &[f64]) -> Result<Seen> {
+        let i = row.i;
+        let (dim, unit) = (kernel.dim(), h.powi(-(kernel.dim() as i32)));
+        let q = memory::collected("a sample", row.r.iter().map(|r| r / h))?;
+        let mut w = memory::filled("a sample", q.len(), 0.0)?;
+        kernel.w(&q, &mut w);
+        w.iter_mut().zip(row.j).for_each(|(w, &j)| *w *= volume[j as usize] * unit);
+        let own = volume[i] * unit * kernel.w_at(0.0);
+        let reach = NEAR * volume[i].powf(1.0 / dim as f64);
+        let near = w.iter().zip(row.r).filter(|(_, r)| **r < reach).map(|(w, _)| w);
+        let aside = (0..dim).map(|a| (w.iter().zip(row.d[a]).map(|(w, d)| w * d).sum::<f64>() / h).powi(2));
+        Ok(Seen {
+            i,
+            around: second(row, dim, &w) / (h * h),
+            conducts: second(row, dim, coefficients) * (0.5 / volume[i]),
+            filled: own + w.iter().sum::<f64>(),
+            own,
+            near: own + near.sum::<f64>(),
+            aside: aside.sum::<f64>().sqrt(),
+        })
+    }
+
+    fn roundness(&self, dim: usize) -> f64 {
+        roundness(&self.around, dim)
+    }
+}
+
+/// Σ weight d dᵀ
+fn second(row: &Row, dim: usize, weight: &[f64]) -> Matrix3<f64> {
     let mut second = Matrix3::zeros();
     for [k, l] in tensor::AXES.into_iter().filter(|[_, l]| *l < dim) {
         let sum = sum::product(weight, row.d[k], row.d[l]);
         (second[(k, l)], second[(l, k)]) = (sum, sum);
     }
-    match dim {
-        2 => both(second.fixed_view::<2, 2>(0, 0).symmetric_eigenvalues().as_slice()),
-        _ => both(second.symmetric_eigenvalues().as_slice()),
-    }
+    second
 }
 
-fn both(values: &[f64]) -> (f64, f64) {
-    (values.iter().copied().fold(f64::INFINITY, f64::min), values.iter().copied().fold(0.0, f64::max))
+fn roundness(around: &Matrix3<f64>, dim: usize) -> f64 {
+    let (least, most) = extremes(around, dim);
+    if most > 0.0 { least / most } else { 0.0 }
+}
+
+/// The least and the largest over the directions that there are.
+fn extremes(second: &Matrix3<f64>, dim: usize) -> (f64, f64) {
+    let ends = |values: &[f64]| {
+        let least = values.iter().copied().fold(f64::INFINITY, f64::min);
+        (least, values.iter().copied().fold(0.0, f64::max))
+    };
+    match dim {
+        1 => (second[(0, 0)], second[(0, 0)]),
+        2 => ends(second.fixed_view::<2, 2>(0, 0).symmetric_eigenvalues().as_slice()),
+        _ => ends(second.symmetric_eigenvalues().as_slice()),
+    }
 }
 
 fn share(seen: &[Seen], of: impl Fn(&Seen) -> bool) -> f64 {

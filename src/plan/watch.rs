@@ -37,7 +37,9 @@ impl Watch {
     }
 
     fn looks_within(&self, part: f64) -> u32 {
-        if self.found { self.looks } else { (f64::from(self.looks) * (part / self.dt)).ceil() as u32 }
+        let apart = if self.found { self.looks } else { (f64::from(self.looks) * (part / self.dt)).ceil() as u32 };
+        // Between two ends of which one is on, the middle tells that something changed.
+        if self.looks == 0 { 0 } else { apart.max(2) }
     }
 }
 
@@ -77,19 +79,24 @@ impl Motion<'_> {
         Ok(part)
     }
 
-    /// How far T may be from where a sub-step would take it in which rates went straight from the first to the last, root
-    /// mean square. Kappa can move T by no more than `reference`, its spread.
+    /// How far T may be from where a sub-step would take it in which rates went straight from the first to the last, or, for
+    /// methods of first order, stayed at one of them, root mean square. Kappa can move T by no more than `reference`, its
+    /// spread.
     fn untold(&mut self, watch: &Watch, now: f64, part: f64, t: &[f64], reference: f64) -> Result<f64> {
         let looks = watch.looks_within(part);
         if looks < 2 {
             return Ok(0.0);
         }
+        let straight = self.choices.method.order > 1;
         let (first, last) = (self.look(watch, now, t)?, self.look(watch, now + part, t)?);
         let (mut most, mut fastest) = (0.0f64, self.rms(|i| first[i]).max(self.rms(|i| last[i])));
         for k in 1..looks {
             let share = f64::from(k) / f64::from(looks);
             let here = self.look(watch, now + share * part, t)?;
-            most = most.max(self.rms(|i| here[i] - (first[i] + share * (last[i] - first[i]))));
+            let bent = self.rms(|i| here[i] - (first[i] + share * (last[i] - first[i])));
+            let aside =
+                if straight { 0.0 } else { self.rms(|i| here[i] - first[i]).max(self.rms(|i| here[i] - last[i])) };
+            most = most.max(bent).max(aside);
             fastest = fastest.max(self.rms(|i| here[i]));
         }
         let moved = part * most;

@@ -91,6 +91,36 @@ impl Solver {
         notes.into_iter().map(|(name, text)| (name.to_string(), text)).collect()
     }
 
+    /// What a snapshot has otherwise than this solver, of all that steps do not change; none where both are of one run.
+    ///
+    /// # Errors
+    /// `NoMemory`; `BadFile` for an array that cannot be used.
+    pub fn difference(&mut self, snapshot: &Snapshot) -> Result<Option<String>> {
+        for (name, own) in self.notes() {
+            let kept = |text: &str| text.split_whitespace().filter(|w| !may_change(w)).collect::<Vec<_>>().join(" ");
+            let (own, other) = (kept(&own), kept(note(snapshot, &name).unwrap_or_default()));
+            if own != other && !["diffusph", HISTORY].contains(&name.as_str()) {
+                return Ok(Some(format!("'{name}' is '{other}' there, and '{own}' here")));
+            }
+        }
+        let here = self.fetch_all("x")?;
+        let places = snapshot.points.iter().flat_map(|p| self.frame.inward(*p).collect::<Vec<_>>());
+        if !places.eq(here) {
+            return Ok(Some("its particles are elsewhere".into()));
+        }
+        for slot in (0..INPUTS).filter(|&slot| slot != fields::T) {
+            if !self.state.inputs[slot].is_each() {
+                continue;
+            }
+            let name = FIELDS[slot].name;
+            let other = snapshot.usable(name)?.map(|field| field.data.to_f64()).transpose()?;
+            if other != Some(self.fetch_all(name)?) {
+                return Ok(Some(format!("{name} has other values there")));
+            }
+        }
+        Ok(None)
+    }
+
     /// Refuses a snapshot that lived on functions of a host which are not there now.
     pub(super) fn refuse_missing_functions(&self, notes: &Notes) -> Result<()> {
         for (wanted, there, name) in [
@@ -121,6 +151,12 @@ impl Solver {
         (state.steps, state.rates, state.moves, state.kappa_changes) = (steps, rates, moves, kappa_changes);
         (state.was_done_here, state.span, state.made) = (was_done_here, span, made);
     }
+}
+
+/// Whether steps change what a word of a note says, or answers do not depend on it.
+fn may_change(word: &str) -> bool {
+    let name = word.split('=').next().unwrap_or_default();
+    ["T", "u", "threads", "memory"].contains(&name)
 }
 
 /// `T m=0.01 kappa=0.6 sigma_SB=5.67e-8`: quantities with an array by their name, others with their number.

@@ -5,8 +5,8 @@ use super::report::{Accuracy, Energy, LeftOut, Report, Seconds, Temperature, Wor
 pub use super::samples::Field;
 use super::scene::{Output, Scene};
 use super::setup::{Made, at_all, make};
-use crate::error::Result;
-use crate::io::{Series, atomic};
+use crate::error::{Error, Result};
+use crate::io::{self, Series, atomic};
 use crate::model::fields;
 use crate::plan::Plan;
 use crate::solver::Solver;
@@ -37,6 +37,9 @@ pub struct Study {
     source: String,
     remarks: Vec<String>,
     setup_seconds: f64,
+    /// When the scene starts, and the step that the solver has come to.
+    start: f64,
+    done: Option<u32>,
 }
 
 impl Study {
@@ -46,10 +49,61 @@ impl Study {
     /// Whatever is wrong with the scene or its files.
     pub fn new(scene: Scene, folder: &Path) -> Result<Study> {
         let start = Instant::now();
-        let Made { solver, exact, remarks } = make(&scene, folder)?;
+        let Made { mut solver, exact, remarks } = make(&scene, folder)?;
+        let begin = solver.get_number("time")?;
         let source = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
         let known = exact.map(Known::Solution);
-        Ok(Study { scene, solver, known, source, remarks, setup_seconds: start.elapsed().as_secs_f64() })
+        let setup_seconds = start.elapsed().as_secs_f64();
+        Ok(Study { scene, solver, known, source, remarks, setup_seconds, start: begin, done: None })
+    }
+
+    /// Goes on from the last snapshot of the same run under `out`: to the same bits as without an interruption. From the
+    /// start where there is none yet.
+    ///
+    /// # Errors
+    /// `BadValue` where the scene writes none, or has changed since; whatever is wrong with the files.
+    pub fn resumed(mut self, out: &Path) -> Result<Study> {
+        let Some(output) = &self.scene.output else {
+            return Err(Error::bad("--continue", "a scene without [output]", "it leaves nothing to go on from"));
+        };
+        let series = Series::open_or_create(out.join(&output.pvd))?;
+        let Some(last) = series.entries().last() else {
+            self.remarks.push("there was nothing to go on from: from the start".into());
+            return Ok(self);
+        };
+        let file = series.file_of(last);
+        let snapshot = io::read(&file)?;
+        if let Some(what) = self.solver.difference(&snapshot)? {
+            let rule = format!("{what}; give the scene as it was, or another folder by --out");
+            return Err(Error::bad("--continue", format!("'{}', which is of another run", file.display()), &rule));
+        }
+        self.solver.set_snapshot(&snapshot).map_err(|e| io::in_file(&file, e))?;
+        let time = self.solver.get_number("time")?;
+        self.done = Some(self.step_at(time, &file)?);
+        self.remarks.push(format!("it went on from '{}'", file.display()));
+        Ok(self)
+    }
+
+    /// The step that ends at this time.
+    fn step_at(&self, time: f64, file: &Path) -> Result<u32> {
+        let span = self.scene.time.end - self.start;
+        let step = ((time - self.start) / span * f64::from(self.scene.time.steps)).round();
+        // Steps end where they do to rounding.
+        if (0.0..=f64::from(self.scene.time.steps)).contains(&step)
+            && (self.end_of(step as u32) - time).abs() < 1e-9 * span
+        {
+            return Ok(step as u32);
+        }
+        let rule = format!(
+            "no step of the scene ends there, at t = {time}; give [time] as it was, or another folder by --out"
+        );
+        Err(Error::bad("--continue", format!("'{}'", file.display()), &rule))
+    }
+
+    /// When a step ends: from the ends of all rather than by adding up, so that the last one arrives at the end.
+    fn end_of(&self, step: u32) -> f64 {
+        let time = &self.scene.time;
+        self.start + (time.end - self.start) * f64::from(step) / f64::from(time.steps)
     }
 
     /// What a step will do.
@@ -138,20 +192,18 @@ impl Study {
     }
 
     fn steps(&mut self, mut writer: Option<&mut Writer>) -> Result<Work> {
-        let (solver, time) = (&mut self.solver, &self.scene.time);
-        let start = solver.get_number("time")?;
-        let mut work = Work::default();
+        let (last, mut work) = (self.scene.time.steps, Work::default());
         let mut write = |solver: &mut Solver, step| match &mut writer {
-            Some(writer) => writer.write(solver, step, time.steps),
+            Some(writer) => writer.write(solver, step, last),
             None => Ok(()),
         };
-        write(solver, 0)?;
-        for step in 1..=time.steps {
-            // From the ends rather than by adding up, so that the last step arrives at the end.
-            let next = start + (time.end - start) * f64::from(step) / f64::from(time.steps);
-            let now = solver.get_number("time")?;
-            work.add(&solver.step(next - now)?);
-            write(solver, step)?;
+        if self.done.is_none() {
+            write(&mut self.solver, 0)?;
+        }
+        for step in self.done.unwrap_or(0) + 1..=last {
+            let dt = self.end_of(step) - self.solver.get_number("time")?;
+            work.add(&self.solver.step(dt)?);
+            write(&mut self.solver, step)?;
         }
         Ok(work)
     }

@@ -433,11 +433,11 @@ fn pulsed(words: &str, limits: f64, on: [f64; 2], what: &str) -> Result<(f64, Ve
 fn heat_that_comes_and_goes_within_a_step_is_not_lost() {
     for method in names("integrators") {
         for limits in [0.5, 2.0, 300.0] {
-            for on in [[0.41, 0.6], [0.15, 0.29], [0.85, 0.99], [0.3, 1.1]] {
+            for on in [[0.41, 0.6], [0.15, 0.29], [0.85, 0.99], [0.3, 1.1], [-1.0, 0.248], [-1.0, 0.155]] {
                 let came = |words: &str| {
                     pulsed(&format!("integrator={method} {words}"), limits, on, "source").map(|(heat, ..)| heat)
                 };
-                let right = on[1].min(1.0) - on[0];
+                let right = on[1].min(1.0) - on[0].max(0.0);
                 // An edge is found to 1/4096 of the step, and errors of 1e-3 are none.
                 for words in ["", "tolerance=1e-5"] {
                     let heat = came(words).unwrap_or_else(|e| panic!("{method} {words} {limits} {on:?}: {e}"));
@@ -445,6 +445,18 @@ fn heat_that_comes_and_goes_within_a_step_is_not_lost() {
                 }
             }
         }
+    }
+    // A rate that rises from nothing, for methods that know one end of a sub-step.
+    for method in ["euler", "backward-euler", "ssprk2"] {
+        let x = lattice(16, 2, 0.2);
+        let mut s = unit_box(&format!("kernel=M4 integrator={method}"), &x, 2, true);
+        s.set_number("T", 0.0).unwrap();
+        s.set_source_callback(Some(Box::new(|time, _, _, source| {
+            source.fill(2.0 * time);
+            0
+        })));
+        let heat = s.step(1.0).unwrap().heat_source;
+        assert!((heat - 1.0).abs() < 0.04, "{method}: {heat}");
     }
     // What stages alone see of it.
     let lost = pulsed("integrator=rkl2 looks=0", 0.5, [0.41, 0.6], "source").unwrap();

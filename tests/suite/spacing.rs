@@ -329,6 +329,63 @@ fn supports_that_end_before_the_next_neighbour_in_a_direction_are_refused() {
 }
 
 #[test]
+fn what_conducts_too_little_together_is_refused_whatever_the_operator() {
+    for (words, spacing, jitter) in [
+        ("operator=consistent kernel=M4", [6.0, 1.0], 0.0),
+        ("operator=consistent kernel=M6 order=2", [9.0, 1.0], 0.0),
+        ("operator=consistent kernel=C2", [7.0, 1.0], 0.0),
+        ("operator=kernel kernel=M4", [5.0, 1.0], 0.0),
+        ("operator=kernel kernel=C6", [6.0, 1.0], 0.0),
+        ("operator=projected kernel=M6", [9.0, 1.0], 0.0),
+    ] {
+        let mut s = grid(words, &[20, 60], &spacing, jitter, &[true; 2]).0;
+        assert!(refused(&mut s, "BAD_VALUE", "larger h_fac"), "{words} {spacing:?}");
+        // It is as wrong as it says.
+        let (mut s, x) = grid(&format!("{words} allow=volumes"), &[20, 60], &spacing, jitter, &[true; 2]);
+        let conducts = conducted(&mut s, &x, 2, 0, 20.0 * spacing[0]);
+        assert!(conducts < 0.7, "{words} {spacing:?}: {conducts}");
+    }
+}
+
+#[test]
+fn particles_that_are_all_in_pairs_see_too_little_and_are_refused() {
+    let paired = |words: &str, dim: usize, n: usize, copies: usize, apart: f64, jitter: f64| {
+        let mut random = Random(5);
+        let mut x = Vec::new();
+        for site in 0..n.pow(dim as u32) {
+            let at: Vec<f64> =
+                (0..dim).map(|a| (site / n.pow(a as u32) % n) as f64 + 0.5 + jitter * random.next()).collect();
+            (0..copies).for_each(|c| x.extend(at.iter().map(|v| v + apart * c as f64)));
+        }
+        let count = x.len() / dim;
+        let mut s = Solver::new(&format!("heat dim={dim} {words}")).unwrap();
+        s.set_box(&vec![0.0; dim], &vec![n as f64; dim], &vec![true; dim]).unwrap();
+        s.set_particles(Strided::new("x", &x, count, dim, dim).unwrap()).unwrap();
+        for (name, value) in [("m", 1.0 / copies as f64), ("rho", 1.0), ("kappa", 1.0)] {
+            s.set_number(name, value).unwrap();
+        }
+        s
+    };
+    for operator in ["brookshaw", "kernel", "projected"] {
+        for (dim, n, copies) in [(1, 60, 2), (2, 16, 4), (3, 7, 8)] {
+            for (apart, jitter) in [(0.0, 0.3), (0.0, 0.15), (0.005, 0.3)] {
+                let words = format!("operator={operator}");
+                let mut s = paired(&words, dim, n, copies, apart, jitter);
+                assert!(
+                    refused(&mut s, "BAD_VALUE", "sees hardly more than itself"),
+                    "{operator} {dim}-D {apart} {jitter}"
+                );
+                // With lengths for their places it is taken, as are single ones, and some that share a place.
+                let wide = 1.3 * (copies as f64).powf(1.0 / dim as f64);
+                let mut s = paired(&format!("{words} h_fac={wide}"), dim, n, copies, apart, jitter);
+                assert!(!refused(&mut s, "BAD_VALUE", ""), "{operator} {dim}-D");
+                assert!(!refused(&mut paired(&words, dim, n, 1, 0.0, jitter), "BAD_VALUE", ""), "{operator} {dim}-D");
+            }
+        }
+    }
+}
+
+#[test]
 fn densities_that_are_summed_over_squeezed_neighbours_are_refused() {
     let summed = |words: &str, count: &[usize], spacing: &[f64], jitter: f64| {
         let dim = count.len();
@@ -350,6 +407,10 @@ fn densities_that_are_summed_over_squeezed_neighbours_are_refused() {
             (&[20, 60], &[8.0, 1.0], 0.1),
             (&[10, 24, 24], &[4.0, 1.0, 1.0], 0.1),
             (&[6, 6, 80], &[20.0, 20.0, 1.0], 0.0),
+            (&[6, 6, 30], &[5.0, 5.0, 1.0], 0.0),
+            (&[6, 6, 48], &[8.0, 8.0, 1.0], 0.25),
+            (&[6, 24, 24], &[5.0, 1.0, 1.0], 0.25),
+            (&[16, 128], &[8.0, 1.0], 0.3),
         ] {
             let words = format!("kernel={kernel}");
             assert!(
