@@ -6,7 +6,7 @@ use crate::error::{Error, Result};
 use crate::memory;
 use crate::pool::{BLOCK, Pool};
 use crate::sum;
-use nalgebra::{DMatrix, linalg::Schur};
+use nalgebra::{Complex, DMatrix, DVector, linalg::Schur};
 
 /// Applications of the operator. A mode that grows by a hundredth of the fastest rate stands out after them by e^8.
 const APPLICATIONS: usize = 40;
@@ -14,10 +14,16 @@ const APPLICATIONS: usize = 40;
 /// What is left of a vector outside a space, below which it is rounding.
 const SPANNED: f64 = 1e-12;
 
+/// How often the search starts again, and the growth, and change of it, in units of the fastest rate, that end it.
+const RESTARTS: usize = 8;
+const SETTLED: f64 = 1e-4;
+
 /// What is left of a uniform mode's rate, of the fastest one, where it is rounding.
 const STILL: f64 = 1e-10;
 
-/// The largest real part among the Ritz values of an operator, in its own unit, and the largest modulus beside it.
+/// The largest real part among the Ritz values of an operator, in its own unit, and the largest modulus beside it. Where
+/// something seems to grow, the search starts again from its Ritz vector: Ritz values of operators that are far from normal
+/// stand right of all eigenvalues at first.
 ///
 /// `weight` are capacities, 0 for particles that do not take part; `apply` sets its second argument to the operator
 /// times its first.
@@ -29,43 +35,127 @@ pub fn rightmost(
     weight: &[f64],
     mut apply: impl FnMut(&[f64], &mut [f64]) -> Result<()>,
 ) -> Result<(f64, f64)> {
-    let n = weight.len();
-    let norm = |v: &[f64]| sum::sum(pool, n, |i| weight[i] * v[i] * v[i]).sqrt();
-    let mut next = start(weight)?;
-    let mut basis: Vec<Vec<f64>> = Vec::new();
-    let mut hessenberg = DMatrix::<f64>::zeros(APPLICATIONS + 1, APPLICATIONS);
-    let mut length = norm(&next);
-    for k in 0..APPLICATIONS {
-        if !length.is_finite() {
-            return Err(Error::NotFinite { what: "the spectrum of the operator".into(), index: 0, value: length });
-        }
-        // Nobody takes part.
-        if length == 0.0 {
+    let mut space = Space::new(pool, weight, start(weight)?, &mut apply)?;
+    let (mut growth, mut fastest) = space.extremes()?;
+    for _ in 0..RESTARTS {
+        if growth <= SETTLED * fastest {
             break;
         }
-        if k > 0 {
-            hessenberg[(k, k - 1)] = length;
-        }
-        pool.update(&mut next, |_, part| part.iter_mut().for_each(|v| *v /= length));
-        basis.push(memory::copied("Krylov space", &next)?);
-        apply(&basis[k], &mut next)?;
-        // Twice, because rounding of the first time leaves something.
-        for _ in 0..2 {
-            let shares = take_out(pool, weight, &basis, &mut next);
-            shares.iter().enumerate().for_each(|(j, share)| hessenberg[(j, k)] += share);
-        }
-        length = norm(&next);
-        // The vectors so far span all that the operator can reach.
-        if length <= SPANNED * hessenberg.column(k).norm() {
+        let Some(vector) = space.ritz_vector(pool)? else { break };
+        space = Space::new(pool, weight, vector, &mut apply)?;
+        let (now, modulus) = space.extremes()?;
+        let before = std::mem::replace(&mut growth, now);
+        fastest = fastest.max(modulus);
+        if (growth - before).abs() <= SETTLED * fastest {
             break;
         }
     }
-    let (growth, fastest) = extremes(hessenberg.view((0, 0), (basis.len(), basis.len())).into_owned())?;
     // What is the same everywhere stays as it is in a closed system: a mode that is known, though its Ritz value be late.
+    let mut rate = memory::filled("a uniform mode", weight.len(), 0.0)?;
     let uniform = memory::collected("a uniform mode", weight.iter().map(|&w| f64::from(w > 0.0)))?;
-    apply(&uniform, &mut next)?;
-    let stays = norm(&next) <= STILL * fastest * norm(&uniform);
+    apply(&uniform, &mut rate)?;
+    let stays = norm(pool, weight, &rate) <= STILL * fastest * norm(pool, weight, &uniform);
     Ok((if stays { growth.max(0.0) } else { growth }, fastest))
+}
+
+fn norm(pool: &Pool, weight: &[f64], v: &[f64]) -> f64 {
+    sum::sum(pool, v.len(), |i| weight[i] * v[i] * v[i]).sqrt()
+}
+
+/// A Krylov space, and the operator on it.
+struct Space {
+    basis: Vec<Vec<f64>>,
+    hessenberg: DMatrix<f64>,
+}
+
+impl Space {
+    fn new(
+        pool: &Pool,
+        weight: &[f64],
+        mut next: Vec<f64>,
+        apply: &mut impl FnMut(&[f64], &mut [f64]) -> Result<()>,
+    ) -> Result<Space> {
+        let mut basis: Vec<Vec<f64>> = Vec::new();
+        let mut hessenberg = DMatrix::<f64>::zeros(APPLICATIONS + 1, APPLICATIONS);
+        let mut length = norm(pool, weight, &next);
+        for k in 0..APPLICATIONS {
+            if !length.is_finite() {
+                return Err(Error::NotFinite { what: "the spectrum of the operator".into(), index: 0, value: length });
+            }
+            // Nobody takes part.
+            if length == 0.0 {
+                break;
+            }
+            if k > 0 {
+                hessenberg[(k, k - 1)] = length;
+            }
+            pool.update(&mut next, |_, part| part.iter_mut().for_each(|v| *v /= length));
+            basis.push(memory::copied("Krylov space", &next)?);
+            apply(&basis[k], &mut next)?;
+            // Twice, because rounding of the first time leaves something.
+            for _ in 0..2 {
+                let shares = take_out(pool, weight, &basis, &mut next);
+                shares.iter().enumerate().for_each(|(j, share)| hessenberg[(j, k)] += share);
+            }
+            length = norm(pool, weight, &next);
+            // The vectors so far span all that the operator can reach.
+            if length <= SPANNED * hessenberg.column(k).norm() {
+                break;
+            }
+        }
+        let hessenberg = hessenberg.view((0, 0), (basis.len(), basis.len())).into_owned();
+        Ok(Space { basis, hessenberg })
+    }
+
+    /// The largest real part and the largest modulus among the Ritz values.
+    fn extremes(&self) -> Result<(f64, f64)> {
+        let values = self.values()?;
+        let fold = |of: fn(f64, f64) -> f64, start| values.iter().map(|v| of(v.re, v.im)).fold(start, f64::max);
+        if values.is_empty() {
+            Ok((0.0, 0.0))
+        } else {
+            Ok((fold(|re, _| re, f64::NEG_INFINITY), fold(f64::hypot, 0.0)))
+        }
+    }
+
+    fn values(&self) -> Result<Vec<Complex<f64>>> {
+        match self.hessenberg.nrows() {
+            0 => return Ok(Vec::new()),
+            // Schur's form wants two.
+            1 => return Ok(vec![self.hessenberg[(0, 0)].into()]),
+            _ => {}
+        }
+        let Some(schur) = Schur::try_new(self.hessenberg.clone(), f64::EPSILON, 100 * APPLICATIONS) else {
+            return Err(Error::NotFinite { what: "the spectrum of the operator".into(), index: 0, value: f64::NAN });
+        };
+        Ok(schur.complex_eigenvalues().iter().copied().collect())
+    }
+
+    /// The real part of the vector that belongs to the rightmost Ritz value, by inverse iteration; none where that fails.
+    fn ritz_vector(&self, pool: &Pool) -> Result<Option<Vec<f64>>> {
+        let values = self.values()?;
+        let Some(value) = values.iter().copied().max_by(|a, b| a.re.total_cmp(&b.re)) else { return Ok(None) };
+        let n = self.hessenberg.nrows();
+        let beside = value + Complex::from(1e-10 * self.hessenberg.norm());
+        let shifted = self.hessenberg.map(Complex::from) - DMatrix::from_diagonal_element(n, n, beside);
+        let lu = shifted.lu();
+        let mut y = DVector::from_element(n, Complex::from(1.0));
+        for _ in 0..2 {
+            let Some(solved) = lu.solve(&y) else { return Ok(None) };
+            let length = solved.norm();
+            y = solved.map(|v| v / length);
+        }
+        if y.iter().any(|v| !v.re.is_finite()) {
+            return Ok(None);
+        }
+        let mut vector = memory::filled("Krylov space", self.basis[0].len(), 0.0)?;
+        pool.chunks(&mut vector, BLOCK, |at, part| {
+            for (share, b) in y.iter().zip(&self.basis) {
+                part.iter_mut().zip(&b[at..]).for_each(|(v, b)| *v += share.re * b);
+            }
+        });
+        Ok(Some(vector))
+    }
 }
 
 /// Takes out of a vector what it has of an orthonormal basis, and answers how much of each: classical Gram and Schmidt, all
@@ -85,22 +175,6 @@ fn take_out(pool: &Pool, weight: &[f64], basis: &[Vec<f64>], vector: &mut [f64])
         }
     });
     shares
-}
-
-/// The largest real part and the largest modulus among the eigenvalues of a matrix.
-fn extremes(matrix: DMatrix<f64>) -> Result<(f64, f64)> {
-    match matrix.nrows() {
-        0 => return Ok((0.0, 0.0)),
-        // Schur's form wants two.
-        1 => return Ok((matrix[(0, 0)], matrix[(0, 0)].abs())),
-        _ => {}
-    }
-    let Some(schur) = Schur::try_new(matrix, f64::EPSILON, 100 * APPLICATIONS) else {
-        return Err(Error::NotFinite { what: "the spectrum of the operator".into(), index: 0, value: f64::NAN });
-    };
-    let values = schur.complex_eigenvalues();
-    let fold = |of: fn(f64, f64) -> f64, start| values.iter().map(|v| of(v.re, v.im)).fold(start, f64::max);
-    Ok((fold(|re, _| re, f64::NEG_INFINITY), fold(f64::hypot, 0.0)))
 }
 
 #[cfg(test)]
