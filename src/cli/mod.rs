@@ -14,7 +14,7 @@ use crate::error::{Error, Result};
 use crate::study::run::Study;
 use crate::study::scene::Scene;
 use clap::error::ContextKind;
-use clap::{Args, Parser, Subcommand};
+use clap::{Args, CommandFactory, Parser, Subcommand};
 use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
@@ -77,6 +77,16 @@ enum Command {
         #[arg(long, value_name = "FILE.svg")]
         out: Option<PathBuf>,
     },
+    /// Print the manual page of the program, or of one of its commands: diffusph man | man -l -
+    Man {
+        /// Which command
+        command: Option<String>,
+    },
+    /// Print what a shell completes: diffusph completions bash > ~/.local/share/bash-completion/completions/diffusph
+    Completions {
+        /// Which shell
+        shell: clap_complete::Shell,
+    },
     /// Measure accuracy, cost or stability ('list studies' shows how); exit code 1 where something is not as it should be
     Study(study::StudyArgs),
 }
@@ -120,6 +130,8 @@ pub fn main() -> ExitCode {
         Command::Look { file, field, at, out } => {
             look::draw(&look::Look { file: &file, field: &field, at, out: out.as_deref() }).and_then(print).map(success)
         }
+        Command::Man { command } => manual(command.as_deref()).and_then(print).map(success),
+        Command::Completions { shell } => print(completions(shell)).map(success),
         Command::Study(args) => study::run(&args),
     };
     match done {
@@ -134,6 +146,29 @@ pub fn main() -> ExitCode {
             ExitCode::from(exit_code(&error))
         }
     }
+}
+
+/// A page of the manual, in roff.
+fn manual(command: Option<&str>) -> Result<String> {
+    let mut program = Program::command();
+    program.build();
+    let page = match command {
+        None => program,
+        Some(name) => {
+            let known = program.get_subcommands().map(|c| c.get_name().to_string()).collect::<Vec<_>>();
+            program.find_subcommand(name).cloned().ok_or_else(|| Error::unknown("command", name, known))?
+        }
+    };
+    let mut text = Vec::new();
+    let rendered = clap_mangen::Man::new(page).render(&mut text);
+    rendered.map_err(|e| Error::Io { path: "the manual".into(), reason: e.to_string() })?;
+    Ok(String::from_utf8_lossy(&text).into_owned())
+}
+
+fn completions(shell: clap_complete::Shell) -> String {
+    let mut text = Vec::new();
+    clap_complete::generate(shell, &mut Program::command(), "diffusph", &mut text);
+    String::from_utf8_lossy(&text).into_owned()
 }
 
 fn success((): ()) -> ExitCode {

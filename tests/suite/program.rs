@@ -97,6 +97,45 @@ fn a_file_can_be_looked_at_without_paraview() {
     }
 }
 
+#[test]
+fn the_manual_and_completions_know_every_command() {
+    let help = ask(program().arg("--help")).out;
+    let listed = help.split("Commands:").nth(1).unwrap().split("Options:").next().unwrap();
+    let name = |line: &'_ str| {
+        line.strip_prefix("  ")
+            .filter(|l| !l.starts_with(' '))
+            .map(|l| l.split(' ').next().unwrap_or_default().to_string())
+    };
+    let commands: Vec<String> = listed.lines().filter_map(name).collect();
+    assert!(["run", "look"].iter().all(|c| commands.iter().any(|k| k == c)), "{commands:?}");
+    let page = ask(program().arg("man"));
+    assert!(page.code == Some(0) && page.out.starts_with(".ie"), "{}", page.out);
+    for command in commands.iter().filter(|c| *c != "help") {
+        assert!(page.out.contains(&format!("diffusph\\-{command}(1)")), "{command}");
+        let own = ask(program().args(["man", command]));
+        assert!(
+            own.code == Some(0) && own.out.contains(&format!(".TH diffusph-{command} 1")),
+            "{command}: {}",
+            own.out
+        );
+    }
+    let wrong = ask(program().args(["man", "rum"]));
+    assert!(wrong.code == Some(2) && wrong.err.contains("did you mean 'run'"), "{}", wrong.err);
+    for shell in ["bash", "zsh", "fish", "powershell", "elvish"] {
+        let text = ask(program().args(["completions", shell])).out;
+        assert!(commands.iter().all(|c| text.contains(c.as_str())) && text.contains("continue"), "{shell}");
+    }
+    // A real shell takes it.
+    let bash = ask(program().args(["completions", "bash"])).out;
+    let folder = tempfile::tempdir().unwrap();
+    let file = write(&folder, "diffusph.bash", &bash);
+    let script = format!(
+        ". {} && COMP_WORDS=(diffusph loo) COMP_CWORD=1 && _diffusph diffusph loo diffusph && echo $COMPREPLY",
+        file.display()
+    );
+    assert_eq!(ask(Command::new("bash").args(["-c", &script])).out.trim(), "look");
+}
+
 /// The bound on the l2 error of each scene with an exact solution, and where it comes from.
 fn bound(name: &str) -> Option<f64> {
     Some(match name {
