@@ -444,6 +444,23 @@ def xml_layouts(folder):
             layout(path(), xml(how, forms[0], "UInt64", "raw", kinds, ""))
 
 
+def resave(folder):
+    """A snapshot of ours as VTK writes it again, in every format that it has for it."""
+    reader = vtk.vtkXMLUnstructuredGridReader()
+    reader.SetFileName(f"{folder}/ours.vtu")
+    reader.Update()
+    for binary in (False, True):
+        writer = vtk.vtkUnstructuredGridWriter()
+        writer.SetFileType(vtk.VTK_BINARY if binary else vtk.VTK_ASCII)
+        writer.SetFileName(f"{folder}/legacy_{str(binary).lower()}.vtk")
+        writer.SetInputData(reader.GetOutput())
+        assert writer.Write()
+    writer = vtk.vtkXMLUnstructuredGridWriter()
+    writer.SetFileName(f"{folder}/again.vtu")
+    writer.SetInputData(reader.GetOutput())
+    assert writer.Write()
+
+
 def read_expected(path):
     folder = path + ".arrays"
     arrays = []
@@ -530,6 +547,8 @@ if __name__ == "__main__":
         write_legacy(folder)
         write_structured(folder)
         copy_data(folder)
+    elif task == "resave":
+        resave(folder)
     elif task == "layouts":
         vtk.vtkObject.GlobalWarningDisplayOff()
         legacy_layouts(folder)

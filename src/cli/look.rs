@@ -75,7 +75,7 @@ fn newest(path: &Path) -> Result<PathBuf> {
 
 impl Drawing {
     fn of(snapshot: &Snapshot, file: &Path, look: &Look) -> Result<Drawing> {
-        let values = values(snapshot, look.field)?;
+        let values = values(snapshot, look.field, file)?;
         let finite = || values.iter().copied().filter(|v| v.is_finite());
         let (low, high) = finite().fold((f64::MAX, f64::MIN), |(low, high), v| (low.min(v), high.max(v)));
         if low > high {
@@ -173,9 +173,12 @@ impl Drawing {
 }
 
 /// A quantity as one number per particle: of vectors their length.
-fn values(snapshot: &Snapshot, name: &str) -> Result<Vec<f64>> {
+fn values(snapshot: &Snapshot, name: &str, file: &Path) -> Result<Vec<f64>> {
     let names = || snapshot.fields.iter().map(|f| f.name.as_str());
-    let field = snapshot.usable(name)?.ok_or_else(|| Error::unknown("array of the file", name, names()))?;
+    let field = snapshot
+        .usable(name)
+        .map_err(|e| io::in_file(file, e))?
+        .ok_or_else(|| Error::unknown("array of the file", name, names()))?;
     let values = field.data.to_f64()?;
     Ok(match field.components {
         1 => values,

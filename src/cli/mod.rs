@@ -122,6 +122,10 @@ pub fn main() -> ExitCode {
         error.remove(ContextKind::Suggested);
         error.exit()
     });
+    let scene = match &program.command {
+        Command::Run { scene, .. } | Command::Plan { scene } => scene.scene.as_ref().map(|s| s.display().to_string()),
+        _ => None,
+    };
     let done = match program.command {
         Command::Run { scene, json, out, resume } => run(&scene, json, &out, resume).map(success),
         Command::Plan { scene } => scene.study().and_then(|mut study| print(study.plan()?.to_string())).map(success),
@@ -141,8 +145,11 @@ pub fn main() -> ExitCode {
                 Error::Cancelled => "interrupted; what was written so far is complete".to_string(),
                 _ => error.to_string(),
             };
+            // Whatever is wrong with a scene, it is said of which.
+            let of = scene.filter(|scene| !message.contains(scene.as_str()) && !matches!(error, Error::Cancelled));
+            let of = of.map_or(String::new(), |scene| format!("{scene}: "));
             // Nobody is left to be told when standard error is closed too.
-            let _ = writeln!(std::io::stderr(), "diffusph: {message}");
+            let _ = writeln!(std::io::stderr(), "diffusph: {of}{message}");
             ExitCode::from(exit_code(&error))
         }
     }

@@ -275,6 +275,12 @@ impl<'a> Reader<'a> {
             }
             (Of::Points, Err(reason)) => self.found.left_aside.push(LeftAside { name, reason }),
             (Of::Cells(_), _) => self.found.of_cells.push(name),
+            // Characters, as VTK keeps the texts of its XML files.
+            (Of::File, Ok(Data::I8(codes))) => {
+                let bytes = codes.iter().map(|&c| c as u8).collect();
+                let text = String::from_utf8(bytes).unwrap_or_default();
+                self.found.take_note(name, text.trim_end_matches('\0').replace('\0', "\n"));
+            }
             (Of::File, Ok(data)) => self.found.take_time(&name, &data),
             (Of::File, Err(_)) => {}
         }

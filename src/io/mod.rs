@@ -136,7 +136,10 @@ fn broken(reason: impl Into<String>) -> Error {
 
 /// The system refused. The path is added where it is known: [`in_file`].
 fn system(error: std::io::Error) -> Error {
-    Error::Io { path: String::new(), reason: format!("cannot read it: {error}") }
+    match error.kind() {
+        std::io::ErrorKind::OutOfMemory => crate::memory::no_memory::<u8>("the name of a file", 0),
+        _ => Error::Io { path: String::new(), reason: format!("cannot read it: {error}") },
+    }
 }
 
 /// The same error with the file's name, unless it has one; an element that cannot be used is the file's fault.

@@ -35,6 +35,11 @@ impl Series {
     /// and are gone are forgotten.
     pub fn open_or_create(path: impl AsRef<Path>) -> Result<Series> {
         let path = path.as_ref();
+        // Snapshots are named by it: two lists must not have the same.
+        if path.file_stem().is_some_and(|stem| stem.to_str().is_none()) {
+            let rule = "the name of a list, which its snapshots have too, must be Unicode";
+            return Err(Error::bad("path", format!("'{}'", path.display().to_string().escape_debug()), rule));
+        }
         if !path.try_exists().map_err(|e| in_file(path, super::system(e)))? {
             return Ok(Series { path: path.into(), entries: Vec::new() });
         }
@@ -102,8 +107,11 @@ impl Series {
 
     /// Removes the snapshots of this series that it listed before, and that nobody finds any more.
     fn remove_unlisted(&self, before: &[Entry]) {
-        let listed: HashSet<&str> = self.entries.iter().map(|e| e.file.as_str()).collect();
-        let gone = before.iter().filter(|e| self.has_numbered(&e.file) && !listed.contains(e.file.as_str()));
+        // However they are written: ./h_0001.vtu is h_0001.vtu.
+        let place = |entry: &Entry| self.file_of(entry).canonicalize().ok();
+        let listed: HashSet<PathBuf> = self.entries.iter().filter_map(place).collect();
+        let unlisted = |entry: &Entry| place(entry).is_some_and(|place| !listed.contains(&place));
+        let gone = before.iter().filter(|e| self.has_numbered(&e.file) && unlisted(e));
         gone.for_each(|entry| {
             let _ = std::fs::remove_file(self.file_of(entry));
         });

@@ -1,8 +1,9 @@
 //! A point cloud with named arrays, owned: what reading a file gives.
 
+use super::broken;
 use super::data::{Data, keep};
 use super::view::{Column, Values, View};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use std::collections::HashMap;
 
 /// VTK's marks of points, and those of its bits that say whose a point is.
@@ -78,7 +79,7 @@ impl Snapshot {
         let field = self.field(name);
         match self.left_aside.iter().find(|l| l.name == name) {
             Some(LeftAside { reason, .. }) if field.is_none() => {
-                Err(Error::bad(&format!("array '{name}' of the file"), "unusable", reason))
+                Err(broken(format!("array '{name}' is unusable: {reason}")))
             }
             _ => Ok(field),
         }

@@ -251,11 +251,17 @@ struct Array<'r, 'a, 'input> {
 
 impl ReadValues for Array<'_, '_, '_> {
     fn values<T: Element>(self) -> Found<Vec<T>> {
+        // What is damaged in its own element is missed by those who need it; appended bytes that lack end with the file.
+        let inline = !self.array.has_attribute("offset");
+        let damaged = |fault| match fault {
+            Fault::Fatal(Error::BadFile { reason, .. }) if inline => Fault::Unfit(reason),
+            other => other,
+        };
         match self.reader.payload(self.array)? {
             None => ascii(text_of(self.array), self.count),
             Some(payload) => {
                 self.reader.take(self.count, size_of::<T>())?;
-                payload.values(&self.reader.layout, self.count)
+                payload.values(&self.reader.layout, self.count).map_err(damaged)
             }
         }
     }

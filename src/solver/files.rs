@@ -97,7 +97,7 @@ impl Solver {
     /// As [`Solver::write_vtk`]; `BadFile` when the list is none.
     pub fn write_series(&mut self, list: impl AsRef<Path>) -> Result<PathBuf> {
         let list = list.as_ref();
-        if ending(list) != "pvd" {
+        if list.extension().is_none_or(|ending| ending != "pvd") {
             return Err(Error::bad("pvd_path", format!("'{}'", list.display()), "its name must end in .pvd"));
         }
         self.write_in(&mut Series::open_or_create(list)?, Options::default(), &[])
@@ -120,8 +120,12 @@ impl Solver {
     /// `Io`, `BadFile`; `BadElement` naming the first bad value; `BadValue` where the particles fill more dimensions than
     /// the solver has; `OutOfOrder` naming a callback that the snapshot needs. Nothing is changed then.
     pub fn read_vtk(&mut self, path: impl AsRef<Path>) -> Result<Vec<String>> {
+        let path = path.as_ref();
         let snapshot = io::read(path)?;
-        self.set_snapshot(&snapshot)?;
+        self.set_snapshot(&snapshot).map_err(|e| match e {
+            damaged @ Error::BadFile { .. } => io::in_file(path, damaged),
+            other => other,
+        })?;
         // What a snapshot of ours holds beside the inputs can be found again.
         let ours = restart::is_ours(&snapshot);
         let has_t = snapshot.field("T").is_some();
@@ -168,7 +172,8 @@ impl Solver {
         let Some(notes) = notes else {
             let domain = self.state.domain.clone();
             let has_t = found.iter().any(|(slot, _)| *slot == fields::T);
-            let u = if has_t { None } else { snapshot.usable("u")?.map(doubles).transpose()? };
+            let u = if has_t { None } else { snapshot.usable("u")?.filter(|f| f.components == 1) };
+            let u = u.map(doubles).transpose()?;
             u.iter().try_for_each(|u| check(fields::T, "u", &Strided::packed(u), (n, dim)))?;
             let energy = u.as_ref().map(|u| Offered::Each(Strided::packed(u)));
             self.state.accept(&Offer { domain, x, given: &given, energy, anew: false })?;

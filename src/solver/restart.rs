@@ -14,6 +14,7 @@ use crate::words::Words;
 use std::fmt::Write;
 
 /// Names of notes.
+const VERSION: &str = "diffusph";
 const GIVEN: &str = "given";
 const LAW: &str = "law";
 const CALLBACKS: &str = "callbacks";
@@ -61,7 +62,7 @@ pub fn axes(snapshot: &Snapshot) -> Option<&str> {
 
 /// Whether a solver wrote it.
 pub fn is_ours(snapshot: &Snapshot) -> bool {
-    note(snapshot, GIVEN).is_some()
+    note(snapshot, GIVEN).is_some() && note(snapshot, VERSION).is_some()
 }
 
 fn note<'a>(snapshot: &'a Snapshot, name: &str) -> Option<&'a str> {
@@ -73,7 +74,7 @@ impl Solver {
     pub(super) fn notes(&self) -> Vec<(String, String)> {
         let state = &self.state;
         let mut notes = vec![
-            ("diffusph", env!("CARGO_PKG_VERSION").to_string()),
+            (VERSION, env!("CARGO_PKG_VERSION").to_string()),
             ("words", self.words().to_string()),
             (GIVEN, given(state)),
             (BOX, domain(&state.domain)),
@@ -99,7 +100,7 @@ impl Solver {
         for (name, own) in self.notes() {
             let kept = |text: &str| text.split_whitespace().filter(|w| !may_change(w)).collect::<Vec<_>>().join(" ");
             let (own, other) = (kept(&own), kept(note(snapshot, &name).unwrap_or_default()));
-            if own != other && !["diffusph", HISTORY].contains(&name.as_str()) {
+            if own != other && ![VERSION, HISTORY].contains(&name.as_str()) {
                 return Ok(Some(format!("'{name}' is '{other}' there, and '{own}' here")));
             }
         }
@@ -208,7 +209,7 @@ impl Notes {
     /// # Errors
     /// `BadValue` naming what cannot be meant: a snapshot of a later version, or one that was edited.
     pub fn read(snapshot: &Snapshot, dim: usize) -> Result<Option<Notes>> {
-        let Some(given) = note(snapshot, GIVEN) else { return Ok(None) };
+        let Some(given) = note(snapshot, GIVEN).filter(|_| is_ours(snapshot)) else { return Ok(None) };
         let mut notes = Notes {
             numbers: Vec::new(),
             arrays: Vec::new(),

@@ -288,7 +288,9 @@ impl Setup<'_> {
         if let Some(exact) = self.exact.as_ref().filter(|_| text == "exact") {
             return Ok(at_all(exact, &self.x, self.solver.dim(), self.start));
         }
-        self.snapshot.as_ref().map_or(Ok(None), |s| s.usable(text))?;
+        let file = self.scene.particles.file.as_deref().unwrap_or(Path::new(""));
+        let usable = self.snapshot.as_ref().map_or(Ok(None), |s| s.usable(text));
+        usable.map_err(|e| io::in_file(file, e))?;
         let fields = || self.snapshot.iter().flat_map(|s| &s.fields);
         let field = fields().find(|f| f.name == text).ok_or_else(|| {
             let laws = LAWS.iter().filter(|_| name == "kappa").map(|(law, _)| *law);

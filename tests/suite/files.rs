@@ -45,6 +45,26 @@ fn refused(path: &Path) -> String {
 }
 
 #[test]
+fn a_damaged_array_is_missed_by_those_who_need_it() {
+    let folder = Folder::new();
+    let damaged = [
+        array("Float64", "vel", "NumberOfComponents=\"3\" format=\"binary\"", "**AAAAAAAA"),
+        array("Float64", "vel", "NumberOfComponents=\"3\" format=\"binary\"", "YAAA"),
+        array("Float64", "vel", "", "1 2 nonsense 4"),
+    ];
+    for vel in &damaged {
+        let file = folder.write("a.vtu", square("", &(temperature() + vel)));
+        let got = io::read(&file).unwrap();
+        assert!(got.field("T").is_some() && got.left_aside.len() == 1, "{vel}");
+        let needed =
+            folder.write("b.vtu", square("", &vel.replace("vel", "T").replace("NumberOfComponents=\"3\"", "")));
+        let mut s = diffusph::Solver::new("heat dim=2").unwrap();
+        let error = s.read_vtk(&needed).unwrap_err();
+        assert!(error.name() == "BAD_FILE" && error.to_string().contains("b.vtu"), "{error}");
+    }
+}
+
+#[test]
 fn an_array_that_nobody_needs_refuses_no_file() {
     let folder = Folder::new();
     for (other, reason) in [

@@ -426,3 +426,47 @@ fn directions_of_another_program_s_file_are_taken_along_the_axes_that_there_are(
     s.set_snapshot(&with_array("b", 3, b)).unwrap();
     assert_eq!(s.get_all("b").unwrap(), (0..100).flat_map(|i| [1.0, f64::from(i)]).collect::<Vec<_>>());
 }
+
+#[test]
+fn what_others_call_as_we_do_is_not_ours() {
+    // Notes of another program; a velocity called u, with nothing that needs a temperature.
+    let mut snapshot = plane([0, 2], 5.0);
+    snapshot.notes.push(("given".into(), "by somebody else".into()));
+    snapshot.fields.push(Field { name: "u".into(), components: 3, data: Data::F64(vec![1.0; 300]) });
+    let mut s = Solver::new("heat dim=2").unwrap();
+    s.set_snapshot(&snapshot).unwrap();
+    assert_eq!(s.get_all("T").unwrap().len(), 100);
+    snapshot.fields.remove(0);
+    let mut without = Solver::new("heat dim=2").unwrap();
+    without.set_snapshot(&snapshot).unwrap();
+    assert!(without.get_all("T").unwrap_err().to_string().contains("set T"));
+}
+
+#[test]
+fn lists_do_not_share_snapshots_nor_lose_what_is_listed_otherwise() {
+    use std::os::unix::ffi::OsStrExt;
+    let dir = tempfile::tempdir().unwrap();
+    let mut s = planar(&plane([0, 1], 0.0), "dim=2").unwrap();
+    for name in [&b"r\xe4.pvd"[..], b"r\xf6.pvd"] {
+        let error = s.write_series(dir.path().join(std::ffi::OsStr::from_bytes(name))).unwrap_err();
+        assert!(error.name() == "BAD_VALUE" && error.to_string().contains("Unicode"), "{error}");
+    }
+    assert!(s.write_series(dir.path().join("h.PVD")).unwrap_err().to_string().contains("end in .pvd"));
+    assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), 0);
+    // One file, listed in two ways; the later entry goes, and the file stays.
+    let list = dir.path().join("h.pvd");
+    for time in [1.0, 5.0] {
+        s.set_number("time", time).unwrap();
+        s.write_series(&list).unwrap();
+    }
+    let entry = |time: f64, file: &str| format!("<DataSet timestep=\"{time}\" part=\"0\" file=\"{file}\"/>");
+    for other in ["./h_0001.vtu".to_string(), dir.path().join("h_0001.vtu").display().to_string()] {
+        let entries = entry(1.0, &other) + &entry(5.0, "h_0001.vtu");
+        let text = format!("<VTKFile type=\"Collection\" version=\"0.1\"><Collection>{entries}</Collection></VTKFile>");
+        std::fs::write(&list, text).unwrap();
+        s.set_number("time", 2.0).unwrap();
+        let written = s.write_series(&list).unwrap();
+        assert!(dir.path().join("h_0001.vtu").is_file() && written.is_file(), "{other}");
+        assert_eq!(Series::read(&list).unwrap().entries().len(), 2, "{other}");
+    }
+}
