@@ -25,6 +25,8 @@ pub struct Layout {
 pub enum Compressor {
     Zlib,
     Lz4,
+    /// Known by name alone: files in digits have it too.
+    Lzma,
 }
 
 impl Layout {
@@ -40,12 +42,16 @@ impl Compressor {
         match self {
             Compressor::Zlib => 1032,
             Compressor::Lz4 => 255,
+            Compressor::Lzma => 1,
         }
     }
 
     fn unpack(self, packed: &[u8], block: &mut [u8]) -> Result<()> {
         let whole = match self {
             Compressor::Zlib => inflate(packed, block).is_ok(),
+            Compressor::Lzma => {
+                return Err(broken("compressor LZMA is not supported; re-save the file with zlib or lz4"));
+            }
             Compressor::Lz4 => lz4_flex::block::decompress_into(packed, block).is_ok_and(|n| n == block.len()),
         };
         whole
@@ -96,6 +102,7 @@ impl<'a> Payload<'a> {
     fn decode<T: Element>(mut self, layout: &Layout, count: Option<usize>) -> Found<Vec<T>> {
         let mut values = match layout.compressor {
             None => self.plain(layout, count)?,
+            Some(Compressor::Lzma) => Compressor::Lzma.unpack(&[], &mut []).map(|()| Vec::new())?,
             Some(compressor) => self.blocks(layout, compressor, count)?,
         };
         if layout.swapped {

@@ -69,6 +69,7 @@ fn compressor(root: Node) -> Result<Option<Compressor>> {
         None | Some("") => Ok(None),
         Some("vtkZLibDataCompressor") => Ok(Some(Compressor::Zlib)),
         Some("vtkLZ4DataCompressor") => Ok(Some(Compressor::Lz4)),
+        Some("vtkLZMADataCompressor") => Ok(Some(Compressor::Lzma)),
         Some(other) => Err(broken(format!("compressor {other} is not supported; re-save the file with zlib or lz4"))),
     }
 }

@@ -165,6 +165,11 @@ impl Surface {
         (low, high)
     }
 
+    /// Calls `visit(i, power)` with the power that is given to each particle here, whatever its T, W.
+    pub fn given(&self, mut visit: impl FnMut(usize, f64)) {
+        self.members.iter().for_each(|(m, e)| visit(m.particle as usize, e.area * e.flux_in));
+    }
+
     /// The same surface for temperatures that are counted from `origin`, where it is linear.
     ///
     /// # Errors

@@ -65,7 +65,7 @@ impl State {
         self.refuse_leaks()?;
         let (mut t, time) = (self.each(fields::T)?, self.time);
         let (applications, iterations) = (self.applications, self.work.iterations);
-        let before = self.before(&plan, &t);
+        let before = self.before(&plan, dt, &t);
         let range = if self.choices.bounds == Promise::Kept { before.range } else { Range::FINITE };
         let integrator = self.choices.method.name;
         let mut report = Report { dt, integrator, energy_before: self.finite_energy(&t)?, ..Report::default() };
@@ -89,6 +89,10 @@ impl State {
         self.timers.add(passes::CHECK.name, checked.elapsed());
 
         (self.inputs[fields::T], self.made) = (Input::Each(t), made);
+        if self.choices.bounds == Promise::Watched && before.range.is_bound() {
+            // Later steps start from wherever this one may have come to.
+            self.span = self.span.map(|_| before.range);
+        }
         if self.energy != Energy::Follows {
             self.energy = Energy::Moved;
         }
@@ -210,7 +214,7 @@ impl State {
         let (low, high) = self.extrema(t);
         let (low, high) = self.surface.as_ref().map_or((low, high), |s| s.with_surroundings(low, high));
         let middle = 0.5 * low + 0.5 * high;
-        if high > low && high - low <= NEARLY * middle.abs() { middle } else { 0.0 }
+        if high - low <= NEARLY * middle.abs() { middle } else { 0.0 }
     }
 
     /// Calls `work` with T counted from `origin`.
@@ -238,12 +242,16 @@ impl State {
         })
     }
 
-    fn before(&mut self, plan: &Plan, t: &[f64]) -> Before {
+    fn before(&mut self, plan: &Plan, dt: f64, t: &[f64]) -> Before {
         let (low, high) = self.extrema(t);
         if self.choices.bounds == Promise::Kept || self.span.is_none() {
             self.span = Some(Range { low, high });
         }
-        let range = self.span.filter(|_| !t.is_empty()).map_or(Range::FINITE, |span| self.reached(span));
+        let reached = |span| match self.choices.bounds {
+            Promise::Watched => self.reached_in(dt, span),
+            _ => self.reached(span),
+        };
+        let range = self.span.filter(|_| !t.is_empty()).map_or(Range::FINITE, reached);
         let spread = if self.may_grow(plan) { self.spread(t) } else { 0.0 };
         Before { range, size: high.abs().max(low.abs()), spread }
     }
@@ -270,6 +278,23 @@ impl State {
             range.low = Range::FINITE.low;
         }
         range
+    }
+
+    /// The same after so long, with what heats and cools T at most; where a function of the host's does, anything.
+    fn reached_in(&self, dt: f64, from: Range) -> Range {
+        let (Some(geometry), Some(inverse), None) = (&self.geometry, &self.inverse_capacity, &self.source_host) else {
+            return self.reached(from);
+        };
+        let source = |i: usize| self.inputs[fields::SOURCE].at(i).unwrap_or(0.0);
+        let released = (0..inverse.len()).map(|i| source(i) * geometry.volume[i] * inverse[i]);
+        let Ok(mut given) = memory::collected("what is given", released) else { return self.reached(from) };
+        let (mut low, mut high) = (from.low, from.high);
+        if let Some(surface) = &self.surface {
+            (low, high) = surface.with_surroundings(low, high);
+            surface.given(|i, power| given[i] += power * inverse[i]);
+        }
+        let most = |sign: f64| sum::max(&self.pool, given.len(), |i| sign * given[i]).max(0.0);
+        Range { low: low - dt * most(-1.0), high: high + dt * most(1.0) }
     }
 
     /// Whether the norm of T is to be checked: nothing heats, and the operator does not rule growth out.

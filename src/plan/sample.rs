@@ -26,12 +26,16 @@ const FLAT: f64 = 0.15;
 /// lattices squeezed 4:1, and 3:1 in 3-D, where summed densities are off by a fifth and more.
 const THIN: f64 = 0.3;
 const MOST_THIN: f64 = 0.2;
+const MOST_THIN_OF_FEW: f64 = 0.5;
 /// The roundness of all surroundings together, away from surfaces: 0.97 in Poisson clouds, 0.8 in bodies of three layers and
 /// 0.6 of two. Lattices squeezed 2:1 have 0.53 to 0.87, and 1.03 of their density; where it is less, or disorder makes single
 /// particles see by far less than all together, 1.07 to 2.5.
 const LEAST_ROUND: f64 = 0.5;
 const LEAST_ROUND_OF_DISORDER: f64 = 0.75;
 const DISORDER: f64 = 0.87;
+const ROUND: f64 = 0.85;
+/// Particles from which their mean says something.
+const SAMPLED: usize = 200;
 /// Length of Σ V W d/h beyond which a particle is at a surface.
 const INSIDE: f64 = 0.25;
 
@@ -113,8 +117,11 @@ impl State {
         let together = inside.iter().map(|s| s.around).sum::<Matrix3<f64>>();
         let (round, single) = (roundness(&together, dim), median(inside.iter().map(|s| s.roundness(dim))));
         let disordered = single < DISORDER * round && round < LEAST_ROUND_OF_DISORDER;
-        let few = 3 * inside.len() < seen.len();
-        if thin <= MOST_THIN && (few || (round >= LEAST_ROUND && !disordered)) {
+        // Few particles are no sample.
+        let many = inside.len() >= SAMPLED && 3 * inside.len() >= seen.len();
+        let squeezed = many && (round < LEAST_ROUND || disordered);
+        let emptied = thin > if many { MOST_THIN } else { MOST_THIN_OF_FEW } && round < ROUND;
+        if !squeezed && !emptied {
             return Ok(());
         }
         let worst = seen.iter().min_by(|a, b| a.roundness(dim).total_cmp(&b.roundness(dim)));

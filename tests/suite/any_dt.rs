@@ -528,3 +528,57 @@ fn small_differences_of_large_temperatures_are_as_right_as_by_themselves() {
         }
     }
 }
+
+#[test]
+fn a_source_is_no_excuse_for_a_mode_that_grows() {
+    let x = lattice(12, 2, 0.45);
+    let scene = |words: &str| {
+        let mut s = unit_box(&format!("kernel=M4 operator=direct allow=unstable integrator=rk4 {words}"), &x, 2, true);
+        set(&mut s, "T", &field(&x, 2, |p| 300.0 + (2.0 * PI * p[0]).sin()));
+        s
+    };
+    let growth = scene("").get_number("growth_rate").unwrap();
+    assert!(growth > 0.0, "{growth}");
+    let dt = 30.0 / growth;
+    for (what, sources) in [("source", true), ("flux_in", true), ("fixed", false)] {
+        for steps in [1, 10] {
+            let mut s = scene("");
+            let one = |v: f64| (0..144).map(|i| if i == 7 { v } else { 0.0 }).collect::<Vec<_>>();
+            set(&mut s, "fixed", &one(1.0).into_iter().rev().collect::<Vec<_>>());
+            if sources {
+                set(&mut s, what, &one(1e-3));
+                s.set_number("area", 1e-2).unwrap();
+            }
+            let refused = (0..steps).map(|_| s.step(dt / f64::from(steps))).find_map(Result::err);
+            let name = refused.map(|e| e.name());
+            assert!(matches!(name, Some("OUT_OF_BOUNDS" | "GROWTH")), "{what} {steps}: {name:?}");
+            let t = s.get_all("T").unwrap();
+            assert!(t.iter().all(|t| (298.0..302.0).contains(t)), "{what} {steps}");
+        }
+    }
+    // What is heated by as much as its source gives is no mode that grows.
+    let mut s = unit_box("kernel=M4 operator=two-first", &lattice(12, 2, 0.2), 2, true);
+    set(&mut s, "T", &vec![300.0; 144]);
+    set(&mut s, "source", &(0..144).map(|i| f64::from(i % 5) * 1e3).collect::<Vec<_>>());
+    for _ in 0..5 {
+        s.step(0.1).unwrap();
+    }
+    assert!((s.get_number("T_max").unwrap() - 1300.0).abs() < 50.0);
+}
+
+#[test]
+fn heat_adds_up_on_an_offset() {
+    for from in [0.0, 300.0, 1e6] {
+        let x = lattice(50, 1, 0.3);
+        let mut s = unit_box("kernel=C2 operator=kernel integrator=rkl2", &x, 1, true);
+        s.set_number("T", from).unwrap();
+        set(&mut s, "source", &field(&x, 1, |p| 1.0 + (2.0 * PI * p[0]).cos()));
+        let dt = 1e6 * s.limit().unwrap();
+        let report = s.step(dt).unwrap();
+        let gained = report.energy - report.energy_before;
+        assert!(
+            (gained - report.heat_source).abs() < 1e-9 * gained.abs() + 1e-13 * from,
+            "{from}: {gained} {report:?}"
+        );
+    }
+}

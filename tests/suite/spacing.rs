@@ -423,7 +423,21 @@ fn densities_that_are_summed_over_squeezed_neighbours_are_refused() {
             // It is as wrong as the message has it.
             assert!(!refused(&mut insisted, "BAD_VALUE", "") && mean > 1.15, "{words} {spacing:?}: {mean}");
         }
-        // Lattices that are hardly squeezed, and uniformly random points.
+        // Uniformly random points, few and more.
+        for seed in 0..24 {
+            let (dim, n) = ([2, 3][seed % 2], [100, 125, 400, 1500][seed / 2 % 4]);
+            let mut random = Random(seed as u64 + 1);
+            let x: Vec<f64> = (0..n * dim).map(|_| 0.5 + 0.5 * random.next()).collect();
+            let mut s = Solver::new(&format!("heat dim={dim} kernel={kernel}")).unwrap();
+            if seed % 3 == 0 {
+                s.set_box(&vec![0.0; dim], &vec![1.0; dim], &vec![true; dim]).unwrap();
+            }
+            s.set_particles(Strided::new("x", &x, n, dim, dim).unwrap()).unwrap();
+            s.set_number("m", 1.0 / n as f64).unwrap();
+            s.set_number("kappa", 1.0).unwrap();
+            assert!(!refused(&mut s, "BAD_VALUE", "summed"), "{kernel} {dim}-D {n} {seed}");
+        }
+        // Lattices that are hardly squeezed, and as much disorder as there can be.
         for (count, spacing, jitter) in [(&[20, 40][..], &[2.0, 1.0][..], 0.1), (&[10, 10, 10], &[1.0; 3], 0.5)] {
             let mut s = summed(&format!("kernel={kernel}"), count, spacing, jitter);
             assert!(!refused(&mut s, "BAD_VALUE", ""), "{kernel} {spacing:?}");

@@ -222,11 +222,19 @@ fn one_wrong_bit_is_seen_on_both_sides() {
 }
 
 #[test]
-fn lzma_is_refused_with_a_remedy() {
+fn lzma_is_refused_with_a_remedy_where_something_is_compressed() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("a.vtu");
-    let file = "<VTKFile type=\"UnstructuredGrid\" compressor=\"vtkLZMADataCompressor\"><UnstructuredGrid/></VTKFile>";
-    std::fs::write(&path, file).unwrap();
+    let file = |points: &str| {
+        format!(
+            "<VTKFile type=\"UnstructuredGrid\" compressor=\"vtkLZMADataCompressor\"><UnstructuredGrid><Piece NumberOfPoints=\"1\">\
+             <Points><DataArray type=\"Float64\" NumberOfComponents=\"3\" {points}</DataArray></Points></Piece></UnstructuredGrid></VTKFile>"
+        )
+    };
+    // Nothing in digits is compressed, whatever the head says.
+    std::fs::write(&path, file("format=\"ascii\">1 2 3")).unwrap();
+    assert_eq!(io::read(&path).unwrap().points, [[1.0, 2.0, 3.0]]);
+    std::fs::write(&path, file("format=\"binary\">AQAAAAAAAAAAAAAA")).unwrap();
     let error = io::read(&path).unwrap_err().to_string();
     assert!(
         error.contains("a.vtu") && error.contains("LZMA") && error.contains("re-save the file with zlib"),
