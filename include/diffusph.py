@@ -194,6 +194,13 @@ def _bytes(text: str) -> bytes:
     return encoded
 
 
+def _path(path: str | os.PathLike[str]) -> bytes:
+    encoded = os.fsencode(path)
+    if b"\0" in encoded:
+        raise ValueError(f"{path!r} contains a NUL")
+    return encoded
+
+
 def _pointer(array: Doubles) -> Any:
     return array.ctypes.data_as(_doubles)
 
@@ -216,7 +223,8 @@ def _readable(values: npt.ArrayLike) -> tuple[Doubles, int]:
     if stride is None:
         array = np.ascontiguousarray(array, dtype=np.float64)
         stride = _stride(array) if array.ndim in (1, 2) else None
-    return array, stride or 1
+    # Of no particles, or of a shape that is refused, any will do.
+    return array, stride or (array.shape[1] if array.ndim == 2 else 1)
 
 
 class Solver:
@@ -268,7 +276,10 @@ class Solver:
             raise raised
 
     def _message(self) -> str:
-        return _spoken(lambda buf, n: _library.diffusph_message(self._handle, buf, n))
+        # Where the solver cannot be asked, the text says that, whatever the status.
+        buffer = ctypes.create_string_buffer(_ROOM)
+        _library.diffusph_message(self._handle, buffer, _ROOM)
+        return buffer.value.decode("utf-8", "replace")
 
     def __len__(self) -> int:
         """The number of particles; 0 before `set_particles`."""
@@ -327,20 +338,16 @@ class Solver:
         """
         positions, stride = _readable(x)
         self._shaped("x", positions)
-        n, arrays, numbers = len(positions), {}, {}
+        n, arrays = len(positions), {}
         for name, values in (("m", m), ("rho", rho), ("h", h)):
             if values is None:
                 continue
-            array = np.asarray(values)
-            if array.ndim == 0:
-                numbers[name] = float(array)
-                continue
+            # A number too goes along with the positions: all are taken, or none.
+            array = np.asarray(values) if np.ndim(values) else np.full(n, values, dtype=np.float64)
             self._shaped(name, array, n)
             arrays[name] = np.ascontiguousarray(array, dtype=np.float64).reshape(n)
         pointers = [_pointer(arrays[name]) if name in arrays else None for name in ("m", "rho", "h")]
         self._call("diffusph_set_particles", n, _pointer(positions), stride, *pointers)
-        for name, number in numbers.items():
-            self.set(name, number)
 
     def set(self, name: str, values: npt.ArrayLike) -> None:
         """A quantity of each particle, in your order, or one number for all; or a number of the solver, such as "time".
@@ -375,7 +382,9 @@ class Solver:
             array = np.ctypeslib.as_array
             t = array(t, (n,))
             t.flags.writeable = False
-            return self._guarded(lambda: function(time, array(particle, (n,)), t, array(out, (n,))) and 0)
+            particle = array(particle, (n,))
+            particle.flags.writeable = False
+            return self._guarded(lambda: function(time, particle, t, array(out, (n,))) and 0)
 
         lent = _field_callback(called) if function is not None else _field_callback()
         self._call(name, lent, None)
@@ -484,12 +493,12 @@ class Solver:
 
     def write_vtk(self, path: str | os.PathLike[str]) -> None:
         """Writes the particles and their quantities as a .vtu, or a legacy .vtk if the name ends so."""
-        self._call("diffusph_write_vtk", os.fsencode(path))
+        self._call("diffusph_write_vtk", _path(path))
 
     def write_series(self, pvd_path: str | os.PathLike[str]) -> None:
         """Writes the next snapshot of a series and lists it in a .pvd."""
-        self._call("diffusph_write_series", os.fsencode(pvd_path))
+        self._call("diffusph_write_series", _path(pvd_path))
 
     def read_vtk(self, path: str | os.PathLike[str]) -> None:
         """Takes particles from a VTK file; from a snapshot of write_vtk, all that the solver needs to go on."""
-        self._call("diffusph_read_vtk", os.fsencode(path))
+        self._call("diffusph_read_vtk", _path(path))

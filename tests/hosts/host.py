@@ -107,6 +107,9 @@ def errors():
         ("kappa_ij has the shape (400,), and needs (n, 3)", lambda: s.set("kappa_ij", np.ones(N * N))),
         ("lo has 1 values", lambda: s.set_box([0], [1, 1])),
         ("contains a NUL", lambda: s.set("T\0", 1.0)),
+        ("contains a NUL", lambda: s.write_vtk("a.vtu\0b")),
+        ("contains a NUL", lambda: s.write_series("a.pvd\0b")),
+        ("contains a NUL", lambda: s.read_vtk("a.vtu\0b")),
     ]:
         raises(ValueError, says, call)
     locked = np.ones(N * N)
@@ -115,7 +118,15 @@ def errors():
         raises(TypeError, "doubles that can be written", lambda: s.get("T", out=out))
     raises(TypeError, "array of numbers", lambda: s.set("T", np.full(N * N, "a")))
     raises(TypeError, "array of numbers", lambda: s.set("T", np.full(N * N, 1j)))
+    # Positions and what comes with them are taken together, or not at all.
+    x = s.get("x")
+    for number in ({"m": -1.0}, {"rho": 0.0}, {"h": np.nan}):
+        raises(diffusph.Error, f"{list(number)[0]}[0] is", lambda: s.set_particles(x[:20] + 0.01, **number))
+        assert len(s) == N * N and (s.get("x") == x).all()
     assert (s.get("T") == before).all() and s.number("time") == 0.0
+    nobody = diffusph.Solver("heat dim=2")
+    nobody.set_particles(np.zeros((0, 2)), m=1.0)
+    assert len(nobody) == 0 and nobody.get("x").shape == (0, 2)
 
 
 def callbacks():
@@ -138,8 +149,14 @@ def callbacks():
     def writes(time, particle, T, out):
         T[0] = 1.0
 
-    s.set_source_callback(writes)
-    raises(ValueError, "read-only", lambda: s.step(1e-3))
+    def renumbers(time, particle, T, out):
+        particle[:] = particle[::-1].copy()
+
+    order = s.get("x")
+    for bad in (writes, renumbers):
+        s.set_source_callback(bad)
+        raises(ValueError, "read-only", lambda: s.step(1e-3))
+        assert (s.get("x") == order).all()
     s.set_source_callback(None)
     shares = []
     s.set_progress_callback(lambda time, share: shares.append(share))
@@ -181,7 +198,7 @@ def threads():
     running = threading.Thread(target=lambda: failed.append(raises(diffusph.Error, "", lambda: s.step(1e3)).name))
     running.start()
     time.sleep(0.3)
-    assert raises(diffusph.Error, "", lambda: s.get("T")).name == "BUSY"
+    assert raises(diffusph.Error, "another call", lambda: s.get("T")).name == "BUSY"
     s.cancel()
     running.join(10)
     assert failed == ["CANCELLED"] and s.number("time") == 0.0
