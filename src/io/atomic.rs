@@ -2,11 +2,11 @@
 //! and the folder synced. Whoever polls the folder never sees half a file; a full disk leaves the old one intact.
 
 use super::limit::Quiet;
+use super::temporary::Temporary;
 use crate::error::{Error, Result};
-use std::fs::{File, OpenOptions, TryLockError};
+use std::fs::File;
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
-use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Makes or replaces the file at `path` by what `fill` writes, or fails and leaves everything as it was.
 pub fn replace(path: &Path, fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>) -> Result<()> {
@@ -35,6 +35,7 @@ impl Prepared {
     /// Gives the file its name.
     pub fn name(self) -> Result<Named> {
         std::fs::rename(&self.temporary.path, &self.path).map_err(|e| failed(&self.path, &e))?;
+        changed();
         Ok(Named { path: self.path, folder: self.folder })
     }
 }
@@ -78,6 +79,19 @@ impl Before {
             (None, true) => Ok(()),
         };
     }
+}
+
+/// Gives a file another name in its folder, in place of what has that name. Not every file system can.
+pub fn second_name(file: &Path, name: &Path) -> io::Result<()> {
+    std::fs::rename(&Temporary::link(file)?.path, name)?;
+    changed();
+    Ok(())
+}
+
+/// Removes a file that nobody needs, if it can be.
+pub fn remove(path: &Path) {
+    let _ = std::fs::remove_file(path);
+    changed();
 }
 
 fn failed(path: &Path, error: &io::Error) -> Error {
@@ -132,86 +146,26 @@ fn sync(folder: File) -> io::Result<()> {
     }
 }
 
-/// An unfinished file; it goes with this unless it has got another name. It is locked as long as somebody writes it.
-struct Temporary {
-    path: PathBuf,
-    file: File,
-}
-
-/// What the names of unfinished files begin and end with.
-const HEAD: &str = ".diffusph.";
-const TAIL: &str = ".tmp";
-
-impl Temporary {
-    /// Another name of a file that is there.
-    fn link(path: &Path) -> io::Result<Temporary> {
-        // Or whoever removes stale files would take it.
-        let file = File::open(path)?;
-        file.try_lock_shared().map_err(io::Error::from)?;
-        let (path, ()) = with_free_name(folder_of(path), |name| std::fs::hard_link(path, name))?;
-        Ok(Temporary { path, file })
-    }
-
-    fn create(folder: &Path) -> io::Result<Temporary> {
-        remove_stale(folder);
-        loop {
-            let open = |name: &Path| OpenOptions::new().write(true).create_new(true).open(name);
-            let (path, file) = with_free_name(folder, open)?;
-            // Whoever removes stale files may have found it before it was locked. Without locks there is no such.
-            let lost = matches!(file.try_lock(), Err(TryLockError::WouldBlock)) || !path.exists();
-            if !lost {
-                return Ok(Temporary { path, file });
-            }
-        }
-    }
-}
-
-/// What `make` makes of the first name of an unfinished file that nothing has yet, and the name.
-fn with_free_name<T>(folder: &Path, make: impl Fn(&Path) -> io::Result<T>) -> io::Result<(PathBuf, T)> {
-    static COUNT: AtomicU64 = AtomicU64::new(0);
-    loop {
-        let number = COUNT.fetch_add(1, Ordering::Relaxed);
-        let path = folder.join(format!("{HEAD}{}.{number}{TAIL}", std::process::id()));
-        match make(&path) {
-            // Left by a killed process that had our number, or another host's on a shared disk: take the next.
-            Err(e) if e.kind() == io::ErrorKind::AlreadyExists => {}
-            made => return made.map(|made| (path, made)),
-        }
-    }
-}
-
-impl Drop for Temporary {
-    fn drop(&mut self) {
-        let _ = std::fs::remove_file(&self.path);
-    }
-}
-
-/// Removes what killed processes left unfinished: files of our name that nobody has locked.
-fn remove_stale(folder: &Path) {
-    let entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
-    let is_file = |entry: &std::fs::DirEntry| entry.file_type().is_ok_and(|kind| kind.is_file());
-    for entry in entries.filter(|entry| is_temporary(&entry.file_name()) && is_file(entry)) {
-        // Without an answer about the lock somebody may hold it.
-        let stale = File::open(entry.path()).and_then(|file| file.try_lock().map(|()| file).map_err(io::Error::from));
-        if let Ok(_lock) = stale {
-            let _ = std::fs::remove_file(entry.path());
-        }
-    }
-}
-
-fn is_temporary(name: &std::ffi::OsStr) -> bool {
-    let numbers = name.to_str().and_then(|name| name.strip_prefix(HEAD)?.strip_suffix(TAIL)?.split_once('.'));
-    let digits = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
-    numbers.is_some_and(|(process, number)| digits(process) && digits(number))
+/// Called after every change of a name that others see: a process may be killed at each of them.
+fn changed() {
+    #[cfg(test)]
+    WATCH.with_borrow(|watch| watch.iter().for_each(|watch| watch()));
 }
 
 #[cfg(test)]
-mod tests {
+thread_local! {
+    pub static WATCH: std::cell::RefCell<Option<Box<dyn Fn()>>> = const { std::cell::RefCell::new(None) };
+}
+
+#[cfg(test)]
+pub(super) mod tests {
     use super::*;
 
-    fn names(folder: &Path) -> Vec<String> {
+    pub fn names(folder: &Path) -> Vec<String> {
         let entries = std::fs::read_dir(folder).unwrap();
-        entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect()
+        let mut names: Vec<String> = entries.map(|e| e.unwrap().file_name().into_string().unwrap()).collect();
+        names.sort();
+        names
     }
 
     #[test]
@@ -260,22 +214,6 @@ mod tests {
     }
 
     #[test]
-    fn what_a_killed_process_left_goes_and_what_is_being_written_stays() {
-        let dir = tempfile::tempdir().unwrap();
-        let stale = dir.path().join(".diffusph.4194305.0.tmp");
-        let other = dir.path().join(".diffusph.mine.tmp");
-        for path in [&stale, &other] {
-            std::fs::write(path, "half").unwrap();
-        }
-        let unfinished = prepare(&dir.path().join("a.vtu"), |sink| sink.write_all(b"whole")).unwrap();
-        replace(&dir.path().join("b.vtu"), |sink| sink.write_all(b"whole")).unwrap();
-        unfinished.publish().unwrap();
-        let mut left = names(dir.path());
-        left.sort();
-        assert_eq!(left, [".diffusph.mine.tmp", "a.vtu", "b.vtu"]);
-    }
-
-    #[test]
     #[cfg(unix)]
     fn a_file_keeps_its_mode() {
         use std::os::unix::fs::PermissionsExt;
@@ -293,7 +231,7 @@ mod tests {
     #[cfg(target_os = "linux")]
     fn a_few_bytes_lost_in_the_buffer_are_noticed() {
         // Ten bytes fit the buffer: only the flush meets the full device.
-        let full = OpenOptions::new().write(true).open("/dev/full").unwrap();
+        let full = std::fs::OpenOptions::new().write(true).open("/dev/full").unwrap();
         let error = fill_and_sync(full, |sink| sink.write_all(b"ten bytes.")).unwrap_err();
         assert_eq!(error.kind(), io::ErrorKind::StorageFull);
     }

@@ -11,12 +11,15 @@
 //! | `xml_write` | `.vtu`, streamed |
 //! | `legacy_read` | legacy `.vtk` |
 //! | `legacy` | legacy `.vtk` to write, through vtkio |
-//! | `pvd` | time series of files |
-//! | `atomic` | every file appears whole or not at all |
+//! | `pvd`, `collection` | time series of files; the text of their list |
+//! | `in_use` | which files a time series needs |
+//! | `atomic`, `temporary` | every file appears whole or not at all; what is unfinished, and its end |
 
 pub mod atomic;
+mod collection;
 mod data;
 mod element;
+mod in_use;
 mod legacy;
 mod legacy_read;
 mod limit;
@@ -26,14 +29,16 @@ mod pvd;
 mod samples;
 mod snapshot;
 mod split;
+mod temporary;
 mod view;
 mod xml;
 mod xml_read;
 mod xml_write;
 
+pub use collection::Entry;
 pub use data::Data;
 pub use element::Element;
-pub use pvd::{Entry, Series};
+pub use pvd::Series;
 pub use snapshot::{Field, LeftAside, OF_CELLS, Snapshot};
 pub use view::{Column, Values, View};
 pub use xml_write::{Encoding, Options};

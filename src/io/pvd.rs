@@ -1,26 +1,20 @@
 //! Time series: a `.pvd` file lists snapshots with their times, for ParaView and pyvista.
 
-use super::atomic::{self, Before, Prepared};
-use super::{broken, in_file, words, xml};
+use super::atomic::{self, Before, Named, Prepared};
+use super::collection::{Entry, format, parse};
+use super::in_use::InUse;
+use super::{in_file, words};
 use crate::error::{Error, Result};
-use std::collections::{HashMap, HashSet};
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
+
+/// What follows the number of a snapshot while an older one of this number is listed: `run_0002.new.vtu`.
+const BESIDE: &str = ".new";
 
 /// A list of files with their times, kept on disk: whoever reads it finds only files that are complete.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     path: PathBuf,
     entries: Vec<Entry>,
-}
-
-#[derive(Debug, Clone, PartialEq)]
-pub struct Entry {
-    pub time: f64,
-    /// As listed: absolute, or relative to the list's folder.
-    pub file: String,
-    /// What else a list says of it, like its part and its group.
-    pub others: Vec<(String, String)>,
 }
 
 impl Series {
@@ -31,8 +25,8 @@ impl Series {
         Ok(Series { path: path.into(), entries })
     }
 
-    /// Goes on with the list at `path`, or starts one that its first snapshot will bring to disk. Files that were listed
-    /// and are gone are forgotten.
+    /// Goes on with the list at `path`, or starts one that its first snapshot will bring to disk. What is listed stays,
+    /// whether its file can be seen now or not.
     pub fn open_or_create(path: impl AsRef<Path>) -> Result<Series> {
         let path = path.as_ref();
         // Snapshots are named by it: two lists must not have the same.
@@ -40,13 +34,10 @@ impl Series {
             let rule = "the name of a list, which its snapshots have too, must be Unicode";
             return Err(Error::bad("path", format!("'{}'", path.display().to_string().escape_debug()), rule));
         }
-        if !path.try_exists().map_err(|e| in_file(path, super::system(e)))? {
-            return Ok(Series { path: path.into(), entries: Vec::new() });
+        match path.try_exists().map_err(|e| in_file(path, super::system(e)))? {
+            true => Series::read(path),
+            false => Ok(Series { path: path.into(), entries: Vec::new() }),
         }
-        let mut series = Series::read(path)?;
-        let folder = atomic::folder_of(path);
-        series.entries.retain(|e| folder.join(&e.file).is_file());
-        Ok(series)
     }
 
     /// Lists a complete `file` at `time` and replaces the list on disk. Entries of this time or later go, and with them the
@@ -62,12 +53,14 @@ impl Series {
     }
 
     /// Writes the next snapshot, of this time, and lists it; answers its path. As [`Series::append`], and `write` prepares
-    /// the file: it takes the place of an older one only when all is there for the list to follow.
+    /// the file, under a name that nothing on the list has: whenever this is stopped, the list on disk names files of its
+    /// times.
     pub fn write(&mut self, time: f64, write: impl FnOnce(&Path) -> Result<Prepared>) -> Result<PathBuf> {
         let path = self.next_file(time);
         let snapshot = write(&path)?;
         self.publish(time, &path, Some(snapshot))?;
-        Ok(path)
+        self.settle();
+        Ok(self.entries.last().map_or(path, |entry| self.file_of(entry)))
     }
 
     fn publish(&mut self, time: f64, file: &Path, snapshot: Option<Prepared>) -> Result<()> {
@@ -80,24 +73,52 @@ impl Series {
             "the name of a listed file, and with it that of the list, must be Unicode without control characters";
         let listed = listed.ok_or_else(|| Error::bad("path", name(), rule))?;
         let new = Entry { time, file: listed.into(), others: vec![("part".into(), "0".into())] };
-        let earlier = self.entries.iter().filter(|e| e.time < time).cloned();
-        let entries: Vec<Entry> = earlier.chain([new]).collect();
-        let text = format(&entries);
-        let list = atomic::prepare(&self.path, |sink| std::io::Write::write_all(sink, text.as_bytes()))?;
+        let entries: Vec<Entry> = self.before(time).cloned().chain([new]).collect();
+        let list = self.prepare(&entries)?;
         let old = snapshot.as_ref().map(|_| Before::of(file));
-        if let Some(snapshot) = snapshot {
-            snapshot.publish()?;
-        }
-        let list = match list.name() {
-            Ok(list) => list,
+        match snapshot.map_or(Ok(()), Prepared::publish).and_then(|()| list.name()) {
+            Ok(list) => self.follow(list, entries),
             Err(e) => {
                 old.into_iter().for_each(Before::restore);
-                return Err(e);
+                Err(e)
             }
-        };
+        }
+    }
+
+    fn prepare(&self, entries: &[Entry]) -> Result<Prepared> {
+        let text = format(entries);
+        atomic::prepare(&self.path, |sink| std::io::Write::write_all(sink, text.as_bytes()))
+    }
+
+    /// Once the list on disk has other entries for good, what only the old ones needed goes.
+    fn follow(&mut self, list: Named, entries: Vec<Entry>) -> Result<()> {
         let before = std::mem::replace(&mut self.entries, entries);
+        list.sync()?;
         self.remove_unlisted(&before);
-        list.sync()
+        Ok(())
+    }
+
+    /// Gives snapshots that had to stand beside an older one its name, now that no entry needs it: first a second name,
+    /// then the list, then the first one goes. Where that cannot be (not every file system has second names), they keep
+    /// the one that they have.
+    fn settle(&mut self) {
+        let wanted = |e: &Entry| self.usual_name(&e.file).filter(|usual| *usual != e.file);
+        if self.entries.iter().all(|e| wanted(e).is_none()) {
+            return;
+        }
+        let mut in_use = self.needed(&self.entries);
+        let mut entries = self.entries.clone();
+        for entry in &mut entries {
+            let Some(usual) = wanted(entry) else { continue };
+            let path = self.path.with_file_name(&usual);
+            if !in_use.has(&path) && atomic::second_name(&self.file_of(entry), &path).is_ok() {
+                in_use.add(&path);
+                entry.file = usual;
+            }
+        }
+        if entries != self.entries {
+            let _ = self.prepare(&entries).and_then(Prepared::name).and_then(|list| self.follow(list, entries));
+        }
     }
 
     /// A file as the list names it.
@@ -105,39 +126,58 @@ impl Series {
         file.strip_prefix(atomic::folder_of(&self.path)).unwrap_or(file)
     }
 
-    /// Removes the snapshots of this series that it listed before, and that nobody finds any more.
+    /// The entries that a snapshot of this time leaves on the list.
+    fn before(&self, time: f64) -> impl Iterator<Item = &Entry> {
+        self.entries.iter().filter(move |e| e.time < time)
+    }
+
+    /// The files that entries need.
+    fn needed<'e>(&self, entries: impl IntoIterator<Item = &'e Entry>) -> InUse {
+        InUse::of(entries.into_iter().map(|e| self.file_of(e)))
+    }
+
+    /// Removes the snapshots of this series that it listed before, and those that a killed process left beside others,
+    /// where no entry needs them.
     fn remove_unlisted(&self, before: &[Entry]) {
-        // However they are written: ./h_0001.vtu is h_0001.vtu.
-        let place = |entry: &Entry| self.file_of(entry).canonicalize().ok();
-        let listed: HashSet<PathBuf> = self.entries.iter().filter_map(place).collect();
-        let unlisted = |entry: &Entry| place(entry).is_some_and(|place| !listed.contains(&place));
-        let gone = before.iter().filter(|e| self.has_numbered(&e.file) && unlisted(e));
-        gone.for_each(|entry| {
-            let _ = std::fs::remove_file(self.file_of(entry));
-        });
-    }
-
-    /// Whether a name is one that [`Series::next_file`] gives.
-    fn has_numbered(&self, file: &str) -> bool {
-        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-        let number = file.strip_prefix(&*stem).and_then(|rest| rest.strip_prefix('_')?.strip_suffix(".vtu"));
-        number.is_some_and(|n| n.len() >= 4 && n.bytes().all(|b| b.is_ascii_digit()))
-    }
-
-    /// Where a snapshot of this time goes: the first number, from that of earlier entries on, that none of them has. What
-    /// they list stays untouched.
-    pub fn next_file(&self, time: f64) -> PathBuf {
-        let earlier: Vec<&Entry> = self.entries.iter().filter(|e| e.time < time).collect();
-        let taken: HashSet<_> = earlier.iter().filter_map(|e| Path::new(&e.file).file_name()).collect();
-        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
-        let mut number = earlier.len();
-        loop {
-            let name = format!("{stem}_{number:04}.vtu");
-            if !taken.contains(std::ffi::OsStr::new(&name)) {
-                return self.path.with_file_name(name);
+        let mut in_use = self.needed(&self.entries);
+        let beside = std::fs::read_dir(atomic::folder_of(&self.path)).into_iter().flatten().flatten();
+        let beside = beside.filter_map(|file| file.file_name().into_string().ok());
+        let beside = beside.filter(|name| self.usual_name(name).is_some_and(|usual| usual != *name));
+        let gone = before.iter().map(|e| e.file.clone()).filter(|name| self.usual_name(name).is_some());
+        for path in gone.chain(beside).map(|name| self.path.with_file_name(name)) {
+            if !in_use.has(&path) {
+                atomic::remove(&path);
             }
+        }
+    }
+
+    /// Of a name that [`Series::next_file`] gives, the one that it gives where no entry has it.
+    fn usual_name(&self, file: &str) -> Option<String> {
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let mut number = file.strip_prefix(&*stem)?.strip_prefix('_')?.strip_suffix(".vtu")?;
+        while let Some(shorter) = number.strip_suffix(BESIDE) {
+            number = shorter;
+        }
+        let ours = number.len() >= 4 && number.bytes().all(|b| b.is_ascii_digit());
+        ours.then(|| format!("{stem}_{number}.vtu"))
+    }
+
+    /// Where a snapshot of this time goes: the first number, from that of earlier entries on, that none of them needs; beside
+    /// the file of that number where a later entry still needs that.
+    pub fn next_file(&self, time: f64) -> PathBuf {
+        let mut in_use = self.needed(self.before(time));
+        let stem = self.path.file_stem().unwrap_or_default().to_string_lossy();
+        let named = |number: usize, beside: &str| self.path.with_file_name(format!("{stem}_{number:04}{beside}.vtu"));
+        let mut number = self.before(time).count();
+        while in_use.has(&named(number, "")) {
             number += 1;
         }
+        self.entries.iter().filter(|e| e.time >= time).for_each(|e| in_use.add(&self.file_of(e)));
+        let mut beside = String::new();
+        while in_use.has(&named(number, &beside)) {
+            beside += BESIDE;
+        }
+        named(number, &beside)
     }
 
     /// The listed files in order of time.
@@ -151,45 +191,13 @@ impl Series {
     }
 }
 
-fn parse(text: &str) -> Result<Vec<Entry>> {
-    let document = xml::document(text)?;
-    let root = document.root_element();
-    if !root.has_tag_name("VTKFile") || root.attribute("type") != Some("Collection") {
-        return Err(broken("it is no list of VTK files (a VTKFile of type Collection)"));
-    }
-    let mut entries = Vec::new();
-    let mut count = HashMap::new();
-    for item in root.descendants().filter(|d| d.has_tag_name("DataSet")) {
-        let text = item.attribute("timestep").map(str::trim).filter(|text| !text.is_empty());
-        let time = text.map(|t| t.parse().ok().filter(|t: &f64| t.is_finite()));
-        // Entries without a time count the steps of their part.
-        let step = count.entry((item.attribute("group"), item.attribute("part"))).or_insert(0u32);
-        let time = time.unwrap_or(Some(f64::from(*step)));
-        *step += 1;
-        let time = time.ok_or_else(|| broken("a DataSet has a timestep that is no number"))?;
-        let file = item.attribute("file").ok_or_else(|| broken("a DataSet names no file"))?;
-        let others = item.attributes().filter(|a| !matches!(a.name(), "timestep" | "file"));
-        let others = others.map(|a| (a.name().to_string(), a.value().to_string())).collect();
-        entries.push(Entry { time, file: file.into(), others });
-    }
-    entries.sort_by(|a, b| a.time.total_cmp(&b.time));
-    Ok(entries)
-}
-
-fn format(entries: &[Entry]) -> String {
-    let mut text =
-        String::from("<?xml version=\"1.0\"?>\n<VTKFile type=\"Collection\" version=\"0.1\">\n  <Collection>\n");
-    for Entry { time, file, others } in entries {
-        let escaped = super::xml_write::escaped;
-        let others: String = others.iter().map(|(name, value)| format!(" {name}=\"{}\"", escaped(value))).collect();
-        let _ = writeln!(text, "    <DataSet timestep=\"{time:?}\"{others} file=\"{}\"/>", escaped(file));
-    }
-    text + "  </Collection>\n</VTKFile>\n"
-}
-
 #[cfg(test)]
 mod tests {
+    use super::super::atomic::tests::names;
     use super::*;
+    use std::cell::RefCell;
+    use std::io::Write;
+    use std::rc::Rc;
 
     fn times(series: &Series) -> Vec<f64> {
         series.entries().iter().map(|e| e.time).collect()
@@ -211,26 +219,10 @@ mod tests {
         assert_eq!(again, series);
         assert!(again.entries().iter().zip(names).all(|(e, name)| e.file == name && again.file_of(e).is_file()));
 
-        // Restarted from the second snapshot, whose successor is gone: it continues from there.
-        std::fs::remove_file(dir.path().join("ü3.vtu")).unwrap();
+        // Restarted from the first snapshot: it continues from there.
         let mut again = Series::open_or_create(&pvd).unwrap();
-        assert_eq!(times(&again), [0.0, 0.1]);
         again.append(0.05, names[1]).unwrap();
         assert_eq!(times(&Series::read(&pvd).unwrap()), [0.0, 0.05]);
-    }
-
-    #[test]
-    fn what_others_say_of_their_entries_is_kept() {
-        let list = |inside: &str| format!("<VTKFile type=\"Collection\"><Collection>{inside}</Collection></VTKFile>");
-        let entries = |inside: &str| parse(&list(inside)).unwrap();
-        let two = "<DataSet timestep='0' group='a &lt; b' part='0' file='a'/><DataSet timestep='' part='1' name='n' file='b'/>";
-        let read = entries(two);
-        assert_eq!(parse(&format(&read)).unwrap(), read);
-        let all: String = read.iter().flat_map(|e| &e.others).map(|(name, value)| format!("{name}={value} ")).collect();
-        assert_eq!(all, "group=a < b part=0 part=1 name=n ");
-        let times = |inside: &str| entries(inside).iter().map(|e| e.time).collect::<Vec<_>>();
-        assert_eq!(times("<DataSet file='a'/><DataSet file='b'/><DataSet file='c'/>"), [0.0, 1.0, 2.0]);
-        assert_eq!(times("<DataSet part='0' file='a'/><DataSet part='1' file='b'/>"), [0.0, 0.0]);
     }
 
     #[test]
@@ -249,6 +241,100 @@ mod tests {
         let mut names: Vec<String> = names.collect();
         names.sort();
         assert_eq!(names, ["mine.vtu", "run.pvd", "run_0000.vtu", "run_0001.vtu", "run_0009.vtu"]);
+    }
+
+    /// A snapshot that holds nothing but its time.
+    fn of(time: f64) -> impl Fn(&Path) -> Result<Prepared> {
+        move |path| atomic::prepare(path, |sink| write!(sink, "{time:?}"))
+    }
+
+    fn write_all(list: &Path, times: impl Iterator<Item = f64>) {
+        for time in times {
+            Series::open_or_create(list).unwrap().write(time, of(time)).unwrap();
+        }
+    }
+
+    fn is_right(list: &Path) -> bool {
+        let Ok(series) = Series::read(list) else { return !list.exists() };
+        let time_of = |entry| std::fs::read_to_string(series.file_of(entry)).ok().and_then(|text| text.parse().ok());
+        series.entries().iter().all(|entry| time_of(entry) == Some(entry.time))
+    }
+
+    /// Runs `work` and answers the folder of the list as each kill on the way would have left it.
+    fn killed_everywhere(folder: &Path, work: impl FnOnce()) -> Vec<tempfile::TempDir> {
+        let (from, left) = (folder.to_path_buf(), Rc::new(RefCell::new(Vec::new())));
+        let keep = Rc::clone(&left);
+        let copy = move || {
+            let now = tempfile::tempdir().unwrap();
+            names(&from).iter().for_each(|name| drop(std::fs::copy(from.join(name), now.path().join(name)).unwrap()));
+            keep.borrow_mut().push(now);
+        };
+        atomic::WATCH.set(Some(Box::new(copy)));
+        work();
+        atomic::WATCH.set(None);
+        left.take()
+    }
+
+    #[test]
+    fn a_list_is_right_whenever_its_writer_is_killed() {
+        let dir = tempfile::tempdir().unwrap();
+        let list = dir.path().join("run.pvd");
+        write_all(&list, (0..5).map(f64::from));
+        // From the start, and from the third snapshot on, with other times.
+        for start in [0.0, 1.0] {
+            let times = || (0..4).map(|k| start + 0.5 * f64::from(k));
+            let left = killed_everywhere(dir.path(), || write_all(&list, times()));
+            assert!(left.len() > 12, "{}", left.len());
+            for folder in left {
+                let list = folder.path().join("run.pvd");
+                assert!(is_right(&list), "{start}: {:?}", std::fs::read_to_string(&list));
+                // Whoever goes on from there has nothing left over, and the usual names.
+                write_all(&list, (0..6).map(|k| start + 0.25 * f64::from(k)));
+                let listed: Vec<String> = Series::read(&list).unwrap().entries.into_iter().map(|e| e.file).collect();
+                let usual: Vec<String> = (0..listed.len()).map(|k| format!("run_{k:04}.vtu")).collect();
+                assert!(is_right(&list) && listed == usual, "{listed:?}");
+                assert!(!names(folder.path()).iter().any(|name| name.contains(BESIDE) || name.contains("tmp")));
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_that_an_earlier_entry_needs_is_not_overwritten() {
+        let entry = |time: f64, file: &str| Entry { time, file: file.into(), others: Vec::new() };
+        let listed = |first: &str, prepare: fn(&Path)| {
+            let dir = tempfile::tempdir().unwrap();
+            let list = dir.path().join("h.pvd");
+            std::fs::write(dir.path().join("h_0001.vtu"), "of the first").unwrap();
+            prepare(dir.path());
+            std::fs::write(&list, format(&[entry(0.0, first), entry(5.0, "h_0002.vtu")])).unwrap();
+            write_all(&list, (1..6).map(f64::from));
+            assert_eq!(std::fs::read(dir.path().join("h_0001.vtu")).unwrap(), b"of the first", "{first}");
+            Series::read(&list).unwrap().entries.into_iter().map(|e| e.file).collect::<Vec<_>>()
+        };
+        let pieces = |folder: &Path| {
+            std::fs::write(folder.join("all.pvtu"), "<VTKFile><Piece Source=\"./h_0001.vtu\"/></VTKFile>").unwrap();
+        };
+        let files = ["h_0002.vtu", "h_0003.vtu", "h_0004.vtu", "h_0005.vtu", "h_0006.vtu"];
+        assert_eq!(listed("all.pvtu", pieces)[1..], files);
+        #[cfg(unix)]
+        {
+            let link = |folder: &Path| std::os::unix::fs::symlink("h_0001.vtu", folder.join("first.vtu")).unwrap();
+            assert_eq!(listed("first.vtu", link)[1..], files);
+        }
+        assert_eq!(
+            listed("./sub/../h_0001.vtu", |folder| std::fs::create_dir(folder.join("sub")).unwrap())[1..],
+            files
+        );
+    }
+
+    #[test]
+    fn entries_whose_files_cannot_be_seen_stay() {
+        let dir = tempfile::tempdir().unwrap();
+        let list = dir.path().join("run.pvd");
+        write_all(&list, (0..3).map(f64::from));
+        std::fs::remove_file(dir.path().join("run_0001.vtu")).unwrap();
+        write_all(&list, [3.0].into_iter());
+        assert_eq!(times(&Series::read(&list).unwrap()), [0.0, 1.0, 2.0, 3.0]);
     }
 
     #[test]
