@@ -60,7 +60,7 @@ pub enum Error {
     // The world was wrong.
     #[error("{path}: {reason}")]
     Io { path: String, reason: String },
-    #[error("{path}: {reason}; no particle was read")]
+    #[error("{path}: {reason}")]
     BadFile { path: String, reason: String },
     #[error(
         "there is no room for the {bytes} bytes of {what} ({available} are said to be available in all); use fewer particles, fewer neighbours (smaller h_fac), or raise memory= where that is the limit"

@@ -95,7 +95,15 @@ pub fn remove(path: &Path) {
 }
 
 fn failed(path: &Path, error: &io::Error) -> Error {
-    let reason = format!("cannot write it: {error}; free some space or choose another place");
+    use io::ErrorKind::{FileTooLarge, NotFound, PermissionDenied, QuotaExceeded, ReadOnlyFilesystem, StorageFull};
+    let advice = match error.kind() {
+        StorageFull | QuotaExceeded => "free some space or choose another place",
+        FileTooLarge => "raise the limit on the size of files or choose another place",
+        PermissionDenied | ReadOnlyFilesystem => "choose a place that may be written",
+        NotFound => "make its folder first or choose another place",
+        _ => "choose another name or place",
+    };
+    let reason = format!("cannot write it: {error}; {advice}");
     Error::Io { path: path.display().to_string(), reason }
 }
 
@@ -193,7 +201,7 @@ pub(super) mod tests {
             Err(io::ErrorKind::StorageFull.into())
         });
         let text = error.unwrap_err().to_string();
-        assert!(text.contains("a.vtu") && text.contains("no storage space"), "{text}");
+        assert!(text.contains("a.vtu") && text.contains("no storage space; free some"), "{text}");
         assert_eq!(std::fs::read_to_string(&path).unwrap(), "old");
         assert_eq!(names(dir.path()), ["a.vtu"]);
     }
@@ -239,8 +247,16 @@ pub(super) mod tests {
     #[test]
     fn devices_folders_and_missing_folders_are_errors() {
         let dir = tempfile::tempdir().unwrap();
-        for path in [Path::new("/dev/null"), dir.path(), &dir.path().join("no/such/a.vtu"), Path::new("..")] {
-            assert_eq!(replace(path, |_| Ok(())).unwrap_err().name(), "IO", "{path:?}");
+        let missing = dir.path().join("no/such/a.vtu");
+        for (path, advice) in [
+            (Path::new("/dev/null"), "not a regular file; choose another name"),
+            (dir.path(), "not a regular file; choose another name"),
+            (&missing, "make its folder first"),
+            (Path::new(".."), "choose another name"),
+        ] {
+            let error = replace(path, |_| Ok(())).unwrap_err();
+            let text = error.to_string();
+            assert!(error.name() == "IO" && text.contains(advice) && !text.contains("space"), "{text}");
         }
         assert_eq!(names(dir.path()), Vec::<String>::new());
     }

@@ -12,11 +12,14 @@ use vtkio::model::{
     UnstructuredGridPiece, Version, VertexNumbers, Vtk,
 };
 
+/// The second line of our files.
+pub const TITLE: &str = "diffusph";
+
 /// The file's bytes.
 pub fn encode(view: &View) -> Result<Vec<u8>> {
     let file = Vtk {
         version: Version::new_legacy(4, 2),
-        title: "diffusph".into(),
+        title: TITLE.into(),
         byte_order: ByteOrder::BigEndian,
         data: grid(view)?,
         file_path: None,

@@ -43,6 +43,10 @@ struct Reader<'a> {
 /// What a colour is in a text, of 255: a kind that no file can name, for words have no spaces.
 const SHARE: &str = "share of 255";
 
+/// What is to be known of a legacy file of ours.
+const OURS: &str = "a legacy file has no place for the time, the box, laws and what was one number: they stay as they are; \
+                    and what was found, like h, is there as if it had been given: write a .vtu to go on from";
+
 /// What no number can be taken for: an array that meets one of these has ended early.
 const KEYWORDS: &[&str] = &[
     "DATASET",
@@ -75,7 +79,10 @@ const AN_ARRAY: &str = "an array";
 
 impl<'a> Reader<'a> {
     fn header(&mut self) -> Result<()> {
-        let (_version, _title) = (self.line(), self.line());
+        let (_version, title) = (self.line(), self.line());
+        if title.trim_ascii() == super::legacy::TITLE.as_bytes() {
+            self.found.remarks.push(OURS.into());
+        }
         self.binary = match self.word() {
             Some(word) if word.eq_ignore_ascii_case(b"ASCII") => false,
             Some(word) if word.eq_ignore_ascii_case(b"BINARY") => true,

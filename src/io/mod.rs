@@ -57,7 +57,7 @@ use std::path::Path;
 /// Errors: `IO` when the system refuses, `BAD_FILE` when the content is wrong, `NO_MEMORY`.
 pub fn read(path: impl AsRef<Path>) -> Result<Snapshot> {
     let path = path.as_ref();
-    let mut snapshot = read_any(path, true).map_err(|e| in_file(path, e))?;
+    let mut snapshot = read_any(path, true).map_err(|e| advised(in_file(path, e), "no particle was read"))?;
     if snapshot.ghosts > 0 {
         snapshot.remarks.push(format!("{} points are ghosts (vtkGhostType): left aside", snapshot.ghosts));
     }
@@ -105,6 +105,9 @@ fn read_any(path: &Path, whole: bool) -> Result<Snapshot> {
 
 /// Opens what can be read from front to end and again: a pipe would be waited for, a device has no end.
 fn open(path: &Path) -> Result<File> {
+    if path.as_os_str().is_empty() {
+        return Err(Error::bad("path", "''", "it names no file: give the name of one"));
+    }
     let about = std::fs::metadata(path).map_err(system)?;
     let what = if about.is_dir() { "a folder" } else { "a pipe or a device" };
     // So are some that the system makes up while they are read, and the next byte of one may never come.
@@ -132,6 +135,14 @@ pub fn words(path: &Path) -> Result<String> {
         String::from_utf8(bytes).map_err(|_| broken("its text is not UTF-8"))
     };
     read(path).map_err(|e| in_file(path, e))
+}
+
+/// The same error where the content is wrong, with what follows from that or what to do about it.
+pub fn advised(error: Error, advice: &str) -> Error {
+    match error {
+        Error::BadFile { path, reason } => Error::BadFile { path, reason: format!("{reason}; {advice}") },
+        other => other,
+    }
 }
 
 /// The content is wrong. The path is added where it is known: [`in_file`].

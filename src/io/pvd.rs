@@ -3,7 +3,7 @@
 use super::atomic::{self, Before, Named, Prepared};
 use super::collection::{Entry, format, parse};
 use super::in_use::InUse;
-use super::{in_file, words};
+use super::{advised, in_file, words};
 use crate::error::{Error, Result};
 use std::path::{Path, PathBuf};
 
@@ -35,7 +35,7 @@ impl Series {
             return Err(Error::bad("path", format!("'{}'", path.display().to_string().escape_debug()), rule));
         }
         match path.try_exists().map_err(|e| in_file(path, super::system(e)))? {
-            true => Series::read(path),
+            true => Series::read(path).map_err(|e| advised(e, "remove it, or give another name, to begin a new list")),
             false => Ok(Series { path: path.into(), entries: Vec::new() }),
         }
     }
@@ -377,7 +377,9 @@ mod tests {
         for text in cases {
             std::fs::write(&pvd, text).unwrap();
             let error = Series::open_or_create(&pvd).unwrap_err();
-            assert!(error.name() == "BAD_FILE" && error.to_string().contains("run.pvd"), "{error}");
+            let text = error.to_string();
+            assert!(error.name() == "BAD_FILE" && text.contains("run.pvd") && text.contains("remove it"), "{text}");
+            assert!(!text.contains("particle"), "{text}");
         }
         assert_eq!(Series::read(dir.path().join("none.pvd")).unwrap_err().name(), "IO");
     }

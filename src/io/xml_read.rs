@@ -149,7 +149,11 @@ impl Reader<'_> {
     fn piece(&self, piece: Node) -> Result<Snapshot> {
         let n = points_of(piece)?;
         let points = match arrays(piece, "Points").next() {
-            Some(array) => self.field(array, n).map_err(|fault| in_array(array, fault.error()))?,
+            Some(array) => self.field(array, n).map_err(|fault| match fault {
+                // What is fatal has the name of its array.
+                Fault::Fatal(error) => error,
+                unfit => in_array(array, unfit.error()),
+            })?,
             None if n == 0 => Field { name: String::new(), components: 3, data: Data::F64(Vec::new()) },
             None => return Err(broken("a piece has no Points")),
         };
@@ -360,6 +364,24 @@ fn in_array(array: Node, error: Error) -> Error {
 
 #[cfg(test)]
 mod tests {
+    #[test]
+    fn a_damaged_array_of_points_is_named_once() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("a.vtu");
+        let inline = |values: &str| format!("format=\"ascii\">{values}");
+        for array in [inline("0 0"), inline("0 0 x"), "format=\"appended\" offset=\"9\">".into()] {
+            let text = format!(
+                "<VTKFile type=\"UnstructuredGrid\"><UnstructuredGrid><Piece NumberOfPoints=\"1\"><Points><DataArray \
+                 type=\"Float64\" Name=\"Points\" NumberOfComponents=\"3\" {array}</DataArray></Points></Piece>\
+                 </UnstructuredGrid></VTKFile>"
+            );
+            std::fs::write(&path, text).unwrap();
+            let e = super::super::read(&path).unwrap_err().to_string();
+            assert_eq!(e.matches("array 'Points'").count(), 1, "{e}");
+            assert!(e.ends_with("no particle was read"), "{e}");
+        }
+    }
+
     #[test]
     fn files_without_points_of_their_own_say_what_to_do() {
         let dir = tempfile::tempdir().unwrap();

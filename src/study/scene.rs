@@ -167,7 +167,10 @@ impl Scene {
     /// # Errors
     /// `Io`, `BadFile`; otherwise as [`Scene::parse`].
     pub fn read(path: &Path) -> Result<Scene> {
-        Scene::parse(&path.display().to_string(), &io::words(path)?)
+        const ADVICE: &str =
+            "a scene is a text in TOML ('diffusph list demo' prints one; 'check' looks into particle files)";
+        let text = io::words(path).map_err(|e| io::advised(e, ADVICE))?;
+        Scene::parse(&path.display().to_string(), &text)
     }
 
     /// Reads a scene; `name` names it in errors.

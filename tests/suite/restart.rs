@@ -205,6 +205,27 @@ fn notes_that_cannot_be_meant_are_refused_and_change_nothing() {
     }
 }
 
+#[test]
+fn what_a_legacy_file_of_ours_has_lost_is_said() {
+    let (x, dir) = (lattice(6, 2, 0.3), tempfile::tempdir().unwrap());
+    let mut s = start(&SCENES[0], &x);
+    let told = ["a.vtk", "a.vtu"].map(|name| {
+        s.write_vtk(dir.path().join(name)).unwrap();
+        Solver::new("heat dim=2").unwrap().read_vtk(dir.path().join(name)).unwrap().join("; ")
+    });
+    assert!(told[0].contains("no place for the time, the box, laws") && told[0].contains(".vtu"), "{}", told[0]);
+    assert_eq!(told[1], "");
+}
+
+#[test]
+fn a_path_without_a_name_is_said_to_be_one() {
+    let mut s = Solver::new("heat dim=2").unwrap();
+    let errors = [s.read_vtk("").unwrap_err(), io::words(Path::new("")).unwrap_err(), Series::read("").unwrap_err()];
+    for error in errors {
+        assert!(error.name() == "BAD_VALUE" && error.to_string().contains("names no file"), "{error}");
+    }
+}
+
 /// A plane of particles along two axes of three.
 fn plane(axes: [usize; 2], rest: f64) -> Snapshot {
     let x = lattice(10, 2, 0.2);
