@@ -3,6 +3,7 @@
 
 use super::limit::Quiet;
 use super::temporary::Temporary;
+pub use super::temporary::remove_stale;
 use crate::error::{Error, Result};
 use std::fs::File;
 use std::io::{self, BufWriter, Write};

@@ -266,7 +266,9 @@ mod tests {
         let keep = Rc::clone(&left);
         let copy = move || {
             let now = tempfile::tempdir().unwrap();
-            names(&from).iter().for_each(|name| drop(std::fs::copy(from.join(name), now.path().join(name)).unwrap()));
+            for name in names(&from) {
+                std::fs::copy(from.join(&name), now.path().join(&name)).unwrap();
+            }
             keep.borrow_mut().push(now);
         };
         atomic::WATCH.set(Some(Box::new(copy)));

@@ -82,7 +82,6 @@ fn is_temporary(name: &std::ffi::OsStr) -> bool {
 #[cfg(test)]
 mod tests {
     use super::super::atomic::{prepare, replace, tests::names};
-    use super::*;
     use std::io::Write;
 
     #[test]

@@ -32,10 +32,16 @@ impl Solver {
     /// # Errors
     /// As [`Solver::write_vtk`]; `UnknownWord` for a quantity that does not exist.
     pub fn write_vtk_with(&mut self, path: impl AsRef<Path>, options: Options, extra: &[&str]) -> Result<()> {
-        self.prepare_vtk(path.as_ref(), options, extra)?.publish()
+        self.prepare_vtk(path.as_ref(), options, extra, &[])?.publish()
     }
 
-    fn prepare_vtk(&mut self, path: &Path, options: Options, extra: &[&str]) -> Result<Prepared> {
+    fn prepare_vtk(
+        &mut self,
+        path: &Path,
+        options: Options,
+        extra: &[&str],
+        more_notes: &[(&str, &str)],
+    ) -> Result<Prepared> {
         let legacy = match ending(path).as_str() {
             "vtu" => false,
             "vtk" => true,
@@ -64,7 +70,8 @@ impl Solver {
         if self.state.last_h.len() == n && n > 0 && !legacy {
             fields.push(column(restart::H_START, 1, Values::stored(&self.state.last_h)));
         }
-        let notes = self.notes().into_iter().map(|(name, text)| (name.into(), text.into())).collect();
+        let notes = self.notes().into_iter().map(|(name, text)| (name.into(), text.into()));
+        let notes = notes.chain(more_notes.iter().map(|(name, text)| ((*name).into(), (*text).into()))).collect();
         let view = View { n, points, fields, time: Some(self.state.time), notes };
         if legacy { io::prepare_legacy(path, &view) } else { io::prepare_vtu(path, &view, options) }
     }
@@ -108,7 +115,18 @@ impl Solver {
     /// # Errors
     /// As [`Solver::write_vtk_with`].
     pub fn write_in(&mut self, series: &mut Series, options: Options, extra: &[&str]) -> Result<PathBuf> {
-        series.write(self.state.time, |path| self.prepare_vtk(path, options, extra))
+        self.write_with_notes(series, options, extra, &[])
+    }
+
+    /// The same with notes of the caller's.
+    pub(crate) fn write_with_notes(
+        &mut self,
+        series: &mut Series,
+        options: Options,
+        extra: &[&str],
+        notes: &[(&str, &str)],
+    ) -> Result<PathBuf> {
+        series.write(self.state.time, |path| self.prepare_vtk(path, options, extra, notes))
     }
 
     /// Particles from a VTK file. From a snapshot of ours: all that it holds, in place of what was set before, so that the

@@ -9,6 +9,7 @@
 //! | `setup` | from a scene to a solver |
 //! | `choose` | the particles that a mark is for |
 //! | `run` | the run and its snapshots |
+//! | `resume`, `identity` | how it goes on from the last of them, and what says that it is the same run |
 //! | `report` | accuracy against run time |
 //! | `catalogue` | studies of the library itself, by name |
 //! | `request` | what they are asked for and answer |
@@ -30,6 +31,7 @@ pub mod claims;
 pub mod convergence;
 pub mod exact;
 pub mod glass;
+mod identity;
 pub mod kernels;
 pub mod keys;
 pub mod lattice;
@@ -40,6 +42,7 @@ pub mod plot;
 pub mod positivity;
 pub mod report;
 pub mod request;
+mod resume;
 pub mod run;
 pub mod samples;
 pub mod scene;

@@ -1,12 +1,13 @@
 //! The run of a scene: steps, snapshots, and what they took.
 
 use super::exact::Exact;
+use super::identity;
 use super::report::{Accuracy, Energy, LeftOut, Report, Seconds, Temperature, Work};
 pub use super::samples::Field;
 use super::scene::{Output, Scene};
 use super::setup::{Made, at_all, make};
-use crate::error::{Error, Result};
-use crate::io::{self, Series, atomic};
+use crate::error::Result;
+use crate::io::{Series, atomic};
 use crate::model::fields;
 use crate::plan::Plan;
 use crate::solver::Solver;
@@ -30,16 +31,18 @@ pub type Watch = Box<dyn FnMut(f64) -> bool + Send>;
 
 /// A scene that is ready to run.
 pub struct Study {
-    scene: Scene,
-    solver: Solver,
+    pub(super) scene: Scene,
+    pub(super) solver: Solver,
     known: Option<Known>,
     /// What it is called.
     source: String,
-    remarks: Vec<String>,
+    pub(super) remarks: Vec<String>,
     setup_seconds: f64,
     /// When the scene starts, and the step that the solver has come to.
-    start: f64,
-    done: Option<u32>,
+    pub(super) start: f64,
+    pub(super) done: Option<u32>,
+    /// What its snapshots say of it, once T at the start was seen.
+    pub(super) identity: Option<String>,
 }
 
 impl Study {
@@ -54,54 +57,11 @@ impl Study {
         let source = scene.exact.as_ref().map_or(String::new(), |e| e.name.clone());
         let known = exact.map(Known::Solution);
         let setup_seconds = start.elapsed().as_secs_f64();
-        Ok(Study { scene, solver, known, source, remarks, setup_seconds, start: begin, done: None })
-    }
-
-    /// Goes on from the last snapshot of the same run under `out`: to the same bits as without an interruption. From the
-    /// start where there is none yet.
-    ///
-    /// # Errors
-    /// `BadValue` where the scene writes none, or has changed since; whatever is wrong with the files.
-    pub fn resumed(mut self, out: &Path) -> Result<Study> {
-        let Some(output) = &self.scene.output else {
-            return Err(Error::bad("--continue", "a scene without [output]", "it leaves nothing to go on from"));
-        };
-        let series = Series::open_or_create(out.join(&output.pvd))?;
-        let Some(last) = series.entries().last() else {
-            self.remarks.push("there was nothing to go on from: from the start".into());
-            return Ok(self);
-        };
-        let file = series.file_of(last);
-        let snapshot = io::read(&file)?;
-        if let Some(what) = self.solver.difference(&snapshot)? {
-            let rule = format!("{what}; give the scene as it was, or another folder by --out");
-            return Err(Error::bad("--continue", format!("'{}', which is of another run", file.display()), &rule));
-        }
-        self.solver.set_snapshot(&snapshot).map_err(|e| io::in_file(&file, e))?;
-        let time = self.solver.get_number("time")?;
-        self.done = Some(self.step_at(time, &file)?);
-        self.remarks.push(format!("it went on from '{}'", file.display()));
-        Ok(self)
-    }
-
-    /// The step that ends at this time.
-    fn step_at(&self, time: f64, file: &Path) -> Result<u32> {
-        let span = self.scene.time.end - self.start;
-        let step = ((time - self.start) / span * f64::from(self.scene.time.steps)).round();
-        // Steps end where they do to rounding.
-        if (0.0..=f64::from(self.scene.time.steps)).contains(&step)
-            && (self.end_of(step as u32) - time).abs() < 1e-9 * span
-        {
-            return Ok(step as u32);
-        }
-        let rule = format!(
-            "no step of the scene ends there, at t = {time}; give [time] as it was, or another folder by --out"
-        );
-        Err(Error::bad("--continue", format!("'{}'", file.display()), &rule))
+        Ok(Study { scene, solver, known, source, remarks, setup_seconds, start: begin, done: None, identity: None })
     }
 
     /// When a step ends: from the ends of all rather than by adding up, so that the last one arrives at the end.
-    fn end_of(&self, step: u32) -> f64 {
+    pub(super) fn end_of(&self, step: u32) -> f64 {
         let time = &self.scene.time;
         self.start + (time.end - self.start) * f64::from(step) / f64::from(time.steps)
     }
@@ -152,7 +112,10 @@ impl Study {
         self.solver.set_progress_callback(Some(callback));
         let isolated = is_isolated(&mut self.solver)?;
         let (energy, temperature) = (self.solver.get_number("energy")?, extrema(&mut self.solver)?);
-        let mut writer = self.scene.output.as_ref().map(|output| Writer::new(output, out)).transpose()?;
+        let mut writer = match self.scene.output.clone() {
+            Some(output) => Some(Writer::new(self.identity(&output)?, output, out)?),
+            None => None,
+        };
         let work = self.steps(writer.as_mut())?;
 
         let solver = &mut self.solver;
@@ -249,6 +212,8 @@ fn accuracy(solution: &str, solver: &mut Solver, known: &Known) -> Result<Accura
 /// Writes the series.
 struct Writer {
     output: Output,
+    /// What each snapshot says of the run.
+    identity: String,
     pvd: PathBuf,
     series: Series,
     count: usize,
@@ -256,13 +221,14 @@ struct Writer {
 }
 
 impl Writer {
-    fn new(output: &Output, out: &Path) -> Result<Writer> {
+    fn new(identity: String, output: Output, out: &Path) -> Result<Writer> {
         output.fields.iter().try_for_each(|name| fields::field(name).map(drop))?;
         let pvd = out.join(&output.pvd);
         let folder = pvd.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         atomic::make_folder(folder)?;
+        atomic::remove_stale(folder);
         let series = Series::open_or_create(&pvd)?;
-        Ok(Writer { output: output.clone(), pvd, series, count: 0, seconds: 0.0 })
+        Ok(Writer { output, identity, pvd, series, count: 0, seconds: 0.0 })
     }
 
     /// Every so many steps, and at the end.
@@ -272,7 +238,8 @@ impl Writer {
         }
         let start = Instant::now();
         let extra: Vec<&str> = self.output.fields.iter().map(String::as_str).collect();
-        solver.write_in(&mut self.series, self.output.encoding.into(), &extra)?;
+        let notes = [(identity::NOTE, self.identity.as_str())];
+        solver.write_with_notes(&mut self.series, self.output.encoding.into(), &extra, &notes)?;
         self.count += 1;
         self.seconds += start.elapsed().as_secs_f64();
         Ok(())

@@ -10,6 +10,8 @@ mod any_dt;
 mod boundaries;
 mod c_examples;
 mod consistent;
+#[cfg(all(feature = "cli", unix))]
+mod continued;
 mod disorder;
 mod extremes;
 mod files;

@@ -7,7 +7,7 @@ use std::process::{Command, Output, Stdio};
 use std::time::{Duration, Instant};
 use tempfile::TempDir;
 
-fn program() -> Command {
+pub fn program() -> Command {
     Command::new(env!("CARGO_BIN_EXE_diffusph"))
 }
 
@@ -19,13 +19,13 @@ fn scene(name: &str) -> PathBuf {
     repository("tests/scenes").join(name).with_extension("toml")
 }
 
-struct Answer {
-    code: Option<i32>,
-    out: String,
-    err: String,
+pub struct Answer {
+    pub code: Option<i32>,
+    pub out: String,
+    pub err: String,
 }
 
-fn ask(command: &mut Command) -> Answer {
+pub fn ask(command: &mut Command) -> Answer {
     let Output { status, stdout, stderr } = command.stdin(Stdio::null()).output().unwrap();
     let text = |bytes| String::from_utf8(bytes).unwrap();
     Answer { code: status.code(), out: text(stdout), err: text(stderr) }
@@ -38,7 +38,7 @@ fn report(name: &str, out: &Path, more: &[&str]) -> Value {
     serde_json::from_str(&answer.out).unwrap()
 }
 
-fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
+pub fn write(folder: &TempDir, name: &str, text: &str) -> PathBuf {
     let path = folder.path().join(name);
     std::fs::write(&path, text).unwrap();
     path
@@ -575,128 +575,6 @@ mod unix {
         }
         // The scene, the list, and the snapshots that it lists.
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2 + series.entries().len());
-    }
-
-    /// kappa(T), walls, marks, derived h and disorder: what a run has to remember.
-    const REMEMBERED: &str = r#"
-words = "heat dim=2 kernel=M4 threads=1"
-[box]
-lo = [0, 0]
-hi = [1, 1]
-periodic = [false, true]
-[particles]
-lattice = "square"
-n = 60
-jitter = 0.2
-seed = 3
-[set]
-kappa = "power n=2"
-T = 300
-source = 1e3
-[[mark]]
-where = { x = [0, 0.05] }
-set = { T = 400, fixed = true, c_v = 3 }
-[time]
-start = 0.5
-end = 0.51
-steps = 60
-[output]
-pvd = "run.pvd"
-every = 7
-fields = ["flux"]
-"#;
-
-    fn goes_on(folder: &Path, scene: &Path, more: &[&str]) -> Answer {
-        ask(program().args(["run", "--continue", "--out"]).arg(folder).arg(scene).args(more))
-    }
-
-    /// Every file of a folder.
-    fn contents(folder: &Path) -> std::collections::BTreeMap<String, Vec<u8>> {
-        let files = std::fs::read_dir(folder).unwrap().map(|f| f.unwrap().path());
-        files.map(|f| (f.file_name().unwrap().to_str().unwrap().into(), std::fs::read(f).unwrap())).collect()
-    }
-
-    #[test]
-    fn a_run_that_is_killed_goes_on_to_the_same_bits() {
-        let scenes = tempfile::tempdir().unwrap();
-        let scene = write(&scenes, "remembered.toml", REMEMBERED);
-        let whole = tempfile::tempdir().unwrap();
-        let begun = Instant::now();
-        assert_eq!(ask(program().args(["run", "--out"]).arg(whole.path()).arg(&scene)).code, Some(0));
-        let takes = begun.elapsed();
-        let whole = contents(whole.path());
-        assert_eq!(whole.len(), 11);
-        let (mut resumed, mut kills) = (0, 0);
-        for round in 0..12 {
-            let folder = tempfile::tempdir().unwrap();
-            // Killed now and then until it is through.
-            for attempt in 0.. {
-                let mut command = program();
-                command.args(["run", "--continue", "--out"]).arg(folder.path()).arg(&scene).stdin(Stdio::null());
-                let mut child = command.stdout(Stdio::piped()).stderr(Stdio::piped()).spawn().unwrap();
-                std::thread::sleep(
-                    takes.mul_f64(
-                        f64::from((round * 7 + attempt * 3) % 8 + 2) / 12.0 * (1.0 + f64::from(attempt) / 6.0),
-                    ),
-                );
-                kills += u32::from(child.try_wait().unwrap().is_none());
-                let _ = child.kill();
-                let done = child.wait_with_output().unwrap();
-                resumed += u32::from(String::from_utf8_lossy(&done.stdout).contains("it went on from"));
-                if done.status.success() {
-                    break;
-                }
-                assert_eq!(
-                    (done.status.code(), attempt < 60),
-                    (None, true),
-                    "{}",
-                    String::from_utf8_lossy(&done.stderr)
-                );
-            }
-            let now = contents(folder.path());
-            let hidden = |name: &&String| !name.starts_with('.');
-            assert!(now.keys().filter(hidden).eq(whole.keys()), "{:?}", now.keys());
-            assert!(whole.iter().all(|(name, bytes)| now[name] == *bytes), "round {round}: other bits");
-        }
-        assert!(kills >= 12 && resumed >= 6, "{kills} kills, {resumed} resumed");
-    }
-
-    #[test]
-    fn only_the_same_run_goes_on() {
-        let folder = tempfile::tempdir().unwrap();
-        let scene = write(&folder, "remembered.toml", REMEMBERED);
-        let out = folder.path().join("out");
-        let first = goes_on(&out, &scene, &[]);
-        assert!(first.code == Some(0) && first.out.contains("from the start"), "{}", first.out);
-        let before = contents(&out);
-        let again = goes_on(&out, &scene, &["--set", "threads=2"]);
-        assert!(again.code == Some(0) && again.out.contains("it went on from"), "{} {}", again.out, again.err);
-        assert_eq!(contents(&out), before);
-        for (from, to, says) in [
-            ("seed = 3", "seed = 4", "its particles are elsewhere"),
-            ("n = 60", "n = 50", "'given' is"),
-            ("kernel=M4", "kernel=M6", "'words' is 'heat dim=2 kernel=M4' there, and 'heat dim=2 kernel=M6' here"),
-            ("power n=2", "power n=3", "'law' is"),
-            ("source = 1e3", "source = 2e3", "source=1000.0"),
-            ("c_v = 3", "c_v = 4", "c_v has other values there"),
-            ("hi = [1, 1]", "hi = [1, 2]", "'box' is"),
-            ("end = 0.51", "end = 0.505", "no step of the scene ends there"),
-            ("steps = 60", "steps = 7", ""),
-        ] {
-            assert_eq!(REMEMBERED.matches(from).count(), 1, "{from}");
-            let other = write(&folder, "other.toml", &REMEMBERED.replace(from, to));
-            let answer = goes_on(&out, &other, &[]);
-            if says.is_empty() {
-                // The end is that of a step all the same, and nothing is left to do.
-                assert_eq!((answer.code, contents(&out) == before), (Some(0), true), "{from}: {}", answer.err);
-                continue;
-            }
-            assert!(answer.code == Some(2) && answer.err.contains(says), "{from}: {}", answer.err);
-            assert_eq!(contents(&out), before, "{from}");
-        }
-        let none = write(&folder, "other.toml", REMEMBERED.split("[output]").next().unwrap());
-        let answer = goes_on(&out, &none, &[]);
-        assert!(answer.code == Some(2) && answer.err.contains("nothing to go on from"), "{}", answer.err);
     }
 
     #[test]
