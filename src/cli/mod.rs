@@ -31,7 +31,9 @@ struct Program {
 #[derive(Subcommand)]
 enum Command {
     /// Run a scene and report its accuracy against its run time
-    #[command(after_help = "Snapshots appear whole or not at all; Ctrl-C leaves a series that can be read.")]
+    #[command(
+        after_help = "Snapshots appear whole or not at all; Ctrl-C, or whatever else ends a run, leaves a series whose files are of the times that it lists. A rerun replaces the snapshots that an older run listed at its start or later; one that takes the place of another stands beside it first, as heat_0002.new.vtu.\n\n--continue takes only the same run up: the same particles, quantities, T at the start, [time] and [output]; title, threads, memory and encoding may be others."
+    )]
     Run {
         #[command(flatten)]
         scene: SceneArgs,

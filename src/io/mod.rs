@@ -20,6 +20,8 @@ mod collection;
 mod data;
 mod element;
 mod in_use;
+#[cfg(test)]
+mod killed;
 mod legacy;
 mod legacy_read;
 mod limit;

@@ -98,7 +98,7 @@ impl Solver {
 
     /// Writes the next numbered snapshot beside a `.pvd` list and lists it; answers its path. Snapshots listed at this
     /// time or later are replaced: a run that was restarted goes on where it stands, and touches no file that an earlier
-    /// entry lists.
+    /// entry needs. Whenever it is killed, the list on disk names files of its times.
     ///
     /// # Errors
     /// As [`Solver::write_vtk`]; `BadFile` when the list is none.
