@@ -587,7 +587,9 @@ int32_t diffusph_write_vtk(struct diffusph_solver *s,
 /**
  * Writes the next snapshot of a series and lists it: for "run.pvd", the files run_0000.vtu, run_0001.vtu and so on
  * beside it. Snapshots listed at this time or later are replaced, so that a restarted run goes on where it stands; no file
- * that an earlier entry lists is touched.
+ * that an earlier entry needs (by a link, or as a piece of it) is touched, and no earlier entry is dropped, whether its file
+ * can be seen or not. Whenever the process is killed, the list on disk names files of its times: a snapshot that takes the
+ * place of another stands beside it first, as run_0002.new.vtu, and has its usual name once the list has no other of it.
  *
  * \param pvd_path the list, for ParaView; it ends in .pvd
  *
@@ -602,7 +604,7 @@ int32_t diffusph_write_series(struct diffusph_solver *s,
  * as the one that wrote it, if its words are the same; functions that were lent must be lent before. Of the file of another
  * program, positions are taken, every array with the name of a quantity that can be set, and the time if there is one.
  * In one and two dimensions particles may lie along any axes of the file, and are written along the same. The log is told
- * what the file has that is not taken.
+ * what the file has that is not taken, and what a legacy file of diffusph_write_vtk has no place for.
  *
  * Errors: IO, BAD_FILE, BAD_VALUE naming the first bad element, or where the particles fill more dimensions than the solver
  * has; OUT_OF_ORDER naming a function that the snapshot needs; nothing is changed then.

@@ -57,7 +57,7 @@ fn a_list_is_right_whenever_its_writer_is_killed() {
     for start in [0.0, 1.0] {
         let times = || (0..4).map(|k| start + 0.5 * f64::from(k));
         let left = killed_everywhere(dir.path(), || write_all(&list, times()));
-        assert!(left.len() > 12, "{}", left.len());
+        assert!(left.len() >= 8, "{}", left.len());
         for folder in left {
             let list = folder.path().join("run.pvd");
             assert!(is_right(&list), "{start}: {:?}", std::fs::read_to_string(&list));

@@ -380,6 +380,16 @@ fn what_the_world_refuses_is_reported_and_leaves_nothing() {
 }
 
 /// A scene on a square lattice, with these lines for [set], [time] and after.
+#[test]
+fn a_particle_file_is_no_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.vtu");
+    std::fs::write(&path, [0xff; 9]).unwrap();
+    let answer = ask(program().arg("run").arg(path));
+    assert!(answer.code == Some(1) && answer.err.contains("a scene is a text in TOML"), "{}", answer.err);
+    assert!(answer.err.contains("a.vtu") && !answer.err.contains("particle was read"), "{}", answer.err);
+}
+
 fn square(set: &str, time: &str, more: &str) -> String {
     format!(
         "words = \"heat dim=2 kernel=M4 threads=1\"\n[box]\nlo = [0, 0]\nhi = [1, 1]\nperiodic = true\n[particles]\n\
