@@ -89,7 +89,7 @@ impl Assembly<'_> {
 
     /// Whether rows are to be normalised by direction.
     pub fn turns_pairs(&self) -> bool {
-        self.normalise == Normalise::Tensor && self.kernel.dim() > 1
+        self.normalise == Normalise::Tensor
     }
 }
 

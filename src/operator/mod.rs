@@ -31,6 +31,7 @@ pub mod normalise;
 pub mod once;
 mod polynomials;
 mod projected;
+pub mod sides;
 pub mod sparse;
 pub mod spectrum;
 mod stencils;

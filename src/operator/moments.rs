@@ -35,8 +35,7 @@ pub fn conduction(assembly: &Assembly, matrix: &Matrix, pool: &Pool) -> Result<V
     let nu = assembly.kernel.dim();
     assembly.rows.map(pool, &mut out, |_: &mut (), row: Row| {
         let (g, scale) = (matrix.coefficients(row.i), 0.5 / assembly.volume[row.i]);
-        let shape = assembly.shape.filter(|_| assembly.operator.turns_weights());
-        let wanted = shape.map_or(tensor::unit(nu), |shape| shape[row.i]);
+        let wanted = normalise::wanted(assembly, row.i);
         let squares = tensor::AXES.iter().zip(wanted).filter(|([_, l], _)| *l < nu).map(|(&[k, l], wanted)| {
             let off = scale * sum::product(g, row.d[k], row.d[l]) - wanted;
             off * off * if k == l { 1.0 } else { 2.0 }

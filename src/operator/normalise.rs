@@ -13,10 +13,11 @@
 //! particles' φ meets the condition of neither exactly.
 //!
 //! A direction in which a particle has no neighbours cannot conduct, and asking for it would spoil the others: asked for
-//! are those that are there ([`Asked`]).
+//! are those that are there ([`Asked`]), and half of those that have neighbours on one side only ([`sides`]).
 
 use super::Matrix;
 use super::assembly::Assembly;
+use super::sides;
 use super::table::Normalise;
 use super::tensor::{self, AXES, Sym};
 use crate::error::Result;
@@ -55,9 +56,10 @@ pub struct Normals {
 pub fn scale(assembly: &Assembly, matrix: &mut Matrix, normals: &Normals, pool: &Pool) -> Result<()> {
     match (assembly.normalise, assembly.kernel.dim()) {
         (Normalise::No, _) => Ok(()),
+        (Normalise::Tensor, 1) => by_tensor::<1, 1>(assembly, matrix, &normals.tensors, pool),
         (Normalise::Tensor, 2) => by_tensor::<2, 3>(assembly, matrix, &normals.tensors, pool),
-        (Normalise::Tensor, 3) => by_tensor::<3, 6>(assembly, matrix, &normals.tensors, pool),
-        _ => {
+        (Normalise::Tensor, _) => by_tensor::<3, 6>(assembly, matrix, &normals.tensors, pool),
+        (Normalise::Pair, _) => {
             let half = normals.moments.iter().map(|&k| 0.5 / k.max(LEAST_MOMENT));
             let half = &memory::collected("normalisation", half)?[..];
             matrix.scale(pool, move |a, b| half[a] + half[b]);
@@ -159,12 +161,26 @@ fn factor<const D: usize, const C: usize>(d: &[f64; D], a: &[f64; C], b: &[f64; 
 
 /// B of a particle from its coefficients g_ab = V_a V_b w_ab before they are scaled.
 pub fn tensor_of(assembly: &Assembly, row: &Row, g: &[f64]) -> Sym {
-    let shape = assembly.shape.filter(|_| assembly.operator.turns_weights()).map(|shape| &shape[row.i]);
+    let wanted = sides::part_of(&wanted(assembly, row.i), assembly.kernel.dim(), row, g);
+    tensor_for(&wanted, assembly, row, g)
+}
+
+/// What a particle's second moment is to be where neighbours are all around.
+pub fn wanted(assembly: &Assembly, i: usize) -> Sym {
+    let shape = assembly.shape.filter(|_| assembly.operator.turns_weights());
+    shape.map_or(tensor::unit(assembly.kernel.dim()), |shape| shape[i])
+}
+
+/// B for which the second moment is the wanted one.
+pub fn tensor_for(wanted: &Sym, assembly: &Assembly, row: &Row, g: &[f64]) -> Sym {
     let scale = 0.5 / assembly.volume[row.i];
     match assembly.kernel.dim() {
-        1 => [1.0 / (scale * sum::product(g, row.r, row.r)).max(LEAST_MOMENT), 0.0, 0.0, 0.0, 0.0, 0.0],
-        2 => Conditions::<2, 3>::of(scale, row, g).solve(shape),
-        _ => Conditions::<3, 6>::of(scale, row, g).solve(shape),
+        1 => {
+            let moment = (scale * sum::product(g, row.r, row.r)).max(LEAST_MOMENT);
+            [wanted[0] / moment, 0.0, 0.0, 0.0, 0.0, 0.0]
+        }
+        2 => Conditions::<2, 3>::of(scale, row, g).solve(wanted),
+        _ => Conditions::<3, 6>::of(scale, row, g).solve(wanted),
     }
 }
 
@@ -275,19 +291,18 @@ impl<const D: usize, const C: usize> Conditions<D, C> {
         Conditions { a, trace }
     }
 
-    /// B for which the second moments are the shape, or I.
-    fn solve(&self, shape: Option<&Sym>) -> Sym {
+    /// B for which the second moment is the wanted one.
+    fn solve(&self, wanted: &Sym) -> Sym {
         if !(self.trace > 0.0 && self.trace.is_finite()) {
             return tensor::unit(D).map(|u| u / LEAST_MOMENT);
         }
-        let wanted = shape.copied().unwrap_or(tensor::unit(D));
         let (x, moment) = match self.is_round() {
-            true => (cholesky(&self.a, &mandel::<D, C>(&wanted)).map(|(x, _)| x), self.trace / D as f64),
+            true => (cholesky(&self.a, &mandel::<D, C>(wanted)).map(|(x, _)| x), self.trace / D as f64),
             false => (None, 0.0),
         };
         let (x, moment) = match x {
             Some(x) => (x, moment),
-            None => self.solve_for_what_is_there(&wanted),
+            None => self.solve_for_what_is_there(wanted),
         };
         let limit = (moment / LEAST_MOMENT).min(1.0);
         let mut b = [0.0; 6];
@@ -423,15 +438,12 @@ impl Asked {
         let root = self.share.map(f64::sqrt);
         let e = &self.directions;
         let kept = e * Matrix3::from_diagonal(&root.into()) * e.transpose();
-        let all =
-            Matrix3::from_fn(|k, l| s[AXES.iter().position(|&[a, b]| (a, b) == (k.min(l), k.max(l))).unwrap_or(0)]);
-        let part = kept * all * kept;
-        AXES.map(|[k, l]| part[(k, l)])
+        tensor::of_matrix(&(kept * tensor::matrix(s) * kept))
     }
 }
 
 /// From 0 at `low` to 1 at `high`, without a corner.
-fn rise(v: f64, low: f64, high: f64) -> f64 {
+pub fn rise(v: f64, low: f64, high: f64) -> f64 {
     let t = ((v - low) / (high - low)).clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
 }
@@ -519,7 +531,7 @@ mod tests {
     }
 
     /// Σ ω φ r̂ r̂ᵀ of some pairs in the plane, with φ from the answer.
-    fn met(pairs: &[(f64, f64)], shape: Option<&Sym>) -> (Matrix3<f64>, Sym) {
+    fn met(pairs: &[(f64, f64)], wanted: &Sym) -> (Matrix3<f64>, Sym) {
         let (mut j, mut r, mut g) = (Vec::new(), Vec::new(), Vec::new());
         let mut d: [Vec<f64>; 3] = Default::default();
         for &(angle, omega) in pairs {
@@ -530,7 +542,7 @@ mod tests {
             d[1].push(2.0 * angle.sin());
         }
         let row = Row { i: 0, j: &j, r: &r, d: [&d[0], &d[1], &[]] };
-        let b = Conditions::<2, 3>::of(0.5, &row, &g).solve(shape);
+        let b = Conditions::<2, 3>::of(0.5, &row, &g).solve(wanted);
         let mut sum = Matrix3::zeros();
         for &(angle, omega) in pairs {
             let e = nalgebra::Vector3::new(angle.cos(), angle.sin(), 0.0);
@@ -538,6 +550,8 @@ mod tests {
         }
         (sum, b)
     }
+
+    const PLANE: Sym = [1.0, 1.0, 0.0, 0.0, 0.0, 0.0];
 
     #[test]
     fn directions_that_are_there_are_met_and_others_left_alone() {
@@ -550,28 +564,28 @@ mod tests {
                 .map(|k| f64::from(k) * std::f64::consts::PI / 6.0 + 0.1)
                 .map(|a| (a, 0.1 * if a.sin().abs() > 0.7 { squeezed } else { 1.0 }))
                 .collect();
-            assert!(off(met(&around, None).0, 1.0, 0.0, 1.0) < 1e-12);
+            assert!(off(met(&around, &PLANE).0, 1.0, 0.0, 1.0) < 1e-12);
             let shape = [1.5, 0.5, 0.0, 0.25, 0.0, 0.0];
-            assert!(off(met(&around, Some(&shape)).0, 1.5, 0.25, 0.5) < 1e-12);
+            assert!(off(met(&around, &shape).0, 1.5, 0.25, 0.5) < 1e-12);
         }
         // On a line along any direction.
         for angle in [0.0, 0.4, 1.3] {
-            let (m, _) = met(&[(angle, 0.3), (angle + std::f64::consts::PI, 0.2)], None);
+            let (m, _) = met(&[(angle, 0.3), (angle + std::f64::consts::PI, 0.2)], &PLANE);
             let (s, c) = f64::sin_cos(angle);
             assert!(off(m, c * c, c * s, s * s) < 1e-9, "{m}");
         }
         // A line with a little thickness is asked for nothing across, and nothing of it jumps on the way to a plane.
         let thick = |t: f64| [(t, 0.3), (-t, 0.3), (std::f64::consts::PI + t, 0.2), (std::f64::consts::PI - t, 0.2)];
-        let (m, _) = met(&thick(0.05), None);
+        let (m, _) = met(&thick(0.05), &PLANE);
         assert!((m[(0, 0)] - 1.0).abs() < 0.02 && m[(1, 1)] < 0.02, "{m}");
-        let mut last = met(&thick(0.0), None).0;
+        let mut last = met(&thick(0.0), &PLANE).0;
         for k in 1..=400 {
-            let now = met(&thick(f64::from(k) * 0.785 / 400.0), None).0;
+            let now = met(&thick(f64::from(k) * 0.785 / 400.0), &PLANE).0;
             assert!((now - last).amax() < 0.05, "{k}: {last} {now}");
             last = now;
         }
         // Nobody, and hardly anybody.
-        assert_eq!(met(&[], None).1[0], 1.0 / LEAST_MOMENT);
-        assert!(met(&[(0.3, 1e-9)], None).0.amax() < 1e-7);
+        assert_eq!(met(&[], &PLANE).1[0], 1.0 / LEAST_MOMENT);
+        assert!(met(&[(0.3, 1e-9)], &PLANE).0.amax() < 1e-7);
     }
 }

@@ -1,6 +1,7 @@
 //! Symmetric tensors of a particle: the directions in which it conducts.
 
-use crate::space::Axes;
+use crate::space::{Axes, Row};
+use crate::sum;
 use nalgebra::Matrix3;
 
 /// xx, yy, zz, xy, yz, xz: the order in which VTK keeps symmetric tensors. Axes that a space lacks are 0.
@@ -17,6 +18,24 @@ pub fn unit(dim: usize) -> Sym {
 /// The component of row k and column l.
 pub fn component(s: &Sym, k: usize, l: usize) -> f64 {
     s[[[0, 3, 5], [3, 1, 4], [5, 4, 2]][k][l]]
+}
+
+pub fn matrix(s: &Sym) -> Matrix3<f64> {
+    Matrix3::from_fn(|k, l| component(s, k, l))
+}
+
+pub fn of_matrix(m: &Matrix3<f64>) -> Sym {
+    AXES.map(|[k, l]| m[(k, l)])
+}
+
+/// Σ weight d dᵀ
+pub fn second(row: &Row, dim: usize, weight: &[f64]) -> Matrix3<f64> {
+    let mut second = Matrix3::zeros();
+    for [k, l] in AXES.into_iter().filter(|[_, l]| *l < dim) {
+        let sum = sum::product(weight, row.d[k], row.d[l]);
+        (second[(k, l)], second[(l, k)]) = (sum, sum);
+    }
+    second
 }
 
 /// s v

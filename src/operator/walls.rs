@@ -46,7 +46,8 @@ impl<F: Fn(usize) -> bool + Sync + Send> Walls<'_, F> {
         let given = memory::copied("second moments", &normals.tensors)?;
         self.rows.map(self.pool, &mut normals.tensors, |g: &mut Vec<f64>, row: Row| {
             let complete = self.went_on(&row, matrix.coefficients(row.i), g)?;
-            Ok(if complete { normalise::tensor_of(assembly, &row, g) } else { given[row.i] })
+            let wanted = normalise::wanted(assembly, row.i);
+            Ok(if complete { normalise::tensor_for(&wanted, assembly, &row, g) } else { given[row.i] })
         })
     }
 

@@ -302,13 +302,20 @@ fn method(word: &str) -> Result<(&'static Method, Option<Auto>)> {
     Ok((auto.first()?, Some(auto)))
 }
 
+/// The least error of a sub-step, relative to the spread of T, that is more than its rounding.
+const FINEST: f64 = 1e-13;
+
 fn tolerance(words: &mut Words, default: Option<f64>) -> Result<Option<f64>> {
     match words.take("tolerance") {
         None => Ok(default),
         Some("off") => Ok(None),
         Some(word) => match word.parse::<f64>() {
-            Ok(v) if v > 0.0 && v < 1.0 => Ok(Some(v)),
-            _ => Err(Error::bad("tolerance", word, "it must be between 0 and 1, or off")),
+            Ok(v) if (FINEST..1.0).contains(&v) => Ok(Some(v)),
+            _ => Err(Error::bad(
+                "tolerance",
+                word,
+                "it must be from 1e-13, below which rounding hides errors, to 1, or off",
+            )),
         },
     }
 }
@@ -345,7 +352,8 @@ mod tests {
             ("heat operator=two-first theta=-1", "theta must be"),
             ("heat operator=limited mean=geometric", "harmonic and arithmetic"),
             ("heat solver_tolerance=0", "between 0 and 1"),
-            ("heat tolerance=1", "between 0 and 1, or off"),
+            ("heat tolerance=1", "from 1e-13"),
+            ("heat tolerance=1e-20", "rounding hides"),
         ] {
             let text = Choices::parse(line).err().map(|e| e.to_string()).unwrap_or_default();
             assert!(text.contains(expected), "{line}: {text}");

@@ -129,7 +129,7 @@ impl State {
         let value = format!("flat along {axes}: all {} particles have the same", cloud.len());
         let rule = format!(
             "particles that fill {rest} of {dim} dimensions need dim={rest} and their other coordinates alone; a sheet or a \
-             row of one layer in {dim}-D space is had by insisting with allow=flat"
+             row of one layer in {dim}-D space is had by giving rho and insisting with allow=flat"
         );
         Err(Error::bad("x", value, &rule))
     }

@@ -85,11 +85,12 @@ impl Reference {
             return Err(Error::bad("kappa", "a tensor", rule));
         }
         let free = free(solver)?;
-        if is_smooth(solver)? {
-            consistent(solver, dt, tolerance, &free)
-        } else {
-            conservative(solver, dt, tolerance, &free)
+        if is_smooth(solver)?
+            && let Some(reference) = consistent(solver, dt, tolerance, &free)?
+        {
+            return Ok(reference);
         }
+        conservative(solver, dt, tolerance, &free)
     }
 }
 
@@ -111,17 +112,19 @@ pub fn is_smooth(solver: &mut Solver) -> Result<bool> {
     Ok(!open && surface::jump(solver.domain(), &x, &spacing, &kappa)? <= SMOOTH)
 }
 
-fn consistent(solver: &mut Solver, dt: f64, tolerance: f64, free: &[bool]) -> Result<Reference> {
+/// None where no two orders can be used on these particles.
+fn consistent(solver: &mut Solver, dt: f64, tolerance: f64, free: &[bool]) -> Result<Option<Reference>> {
     let (mut found, mut failed) = (Vec::new(), Error::Cancelled);
     for order in ORDERS {
         let words = exact_words(solver.dim(), order, tolerance)?;
         found.extend(attempted(solver, &words, dt, &mut failed)?);
         if let [best, next] = &found[..] {
             let error = l2(&pairs(next, best, free));
-            return Ok(Reference { t: found.swap_remove(0), error, about: "consistent weights of higher order" });
+            let about = "consistent weights of higher order";
+            return Ok(Some(Reference { t: found.swap_remove(0), error, about }));
         }
     }
-    Err(failed)
+    Ok(None)
 }
 
 /// Of the conservative operators: the reference, the same with a support [`LONGER`], and others.

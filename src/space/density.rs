@@ -33,6 +33,8 @@ const GROWTH: f64 = 1.4;
 /// And how much wider than the start the first search is.
 const MARGIN: f64 = 1.1;
 const SEARCHES: usize = 60;
+/// Of a support as long as a box allows.
+const ROUNDING: f64 = 1e-14;
 /// Particles in the Morton cell that gives the first guess of the spacing.
 const CROWD: usize = 8;
 
@@ -275,8 +277,10 @@ pub fn smoothing_lengths(
 
 fn lengths(kernel: &Kernel, h_fac: f64, cloud: &Cloud, weigh: Weigh, start: Vec<f64>, pool: &Pool) -> Result<Vec<f64>> {
     let target = h_fac.powi(kernel.dim() as i32);
+    // A box bears no search that is wider; only where that does not suffice is it too small.
+    let widest = (1.0 - ROUNDING) * cloud.domain.farthest() / kernel.radius();
     let mut tried = start;
-    tried.iter_mut().for_each(|h| *h *= MARGIN);
+    tried.iter_mut().for_each(|h| *h = (*h * MARGIN).min(widest));
     let mut h = memory::filled("h", cloud.len(), 0.0)?;
     for _ in 0..SEARCHES {
         let rows = Rows::new(cloud, &tried, kernel.radius(), pool)?;
@@ -289,7 +293,8 @@ fn lengths(kernel: &Kernel, h_fac: f64, cloud: &Cloud, weigh: Weigh, start: Vec<
         let mut open = 0;
         for (tried, &h) in tried.iter_mut().zip(&h) {
             open += usize::from(h == 0.0);
-            *tried = if h == 0.0 { *tried * GROWTH } else { h };
+            let wider = if *tried < widest { (*tried * GROWTH).min(widest) } else { *tried * GROWTH };
+            *tried = if h == 0.0 { wider } else { h };
         }
         if open == 0 {
             return Ok(h);

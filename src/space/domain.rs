@@ -85,6 +85,16 @@ impl Domain {
         image(from)..=image(to)
     }
 
+    /// The longest support that [`Domain::check_reach`] takes; infinite in open space.
+    pub fn farthest(&self) -> f64 {
+        let periodic = (0..self.dim).filter(|&a| self.periodic[a]);
+        periodic.map(|a| Self::images_of(self.length(a))).fold(f64::INFINITY, f64::min)
+    }
+
+    fn images_of(length: f64) -> f64 {
+        length * MAX_IMAGES as f64
+    }
+
     /// Refuses a support that is not among [`lengths`] or so large that it reaches more than [`MAX_IMAGES`] images.
     pub fn check_reach(&self, reach: f64, index: usize) -> Result<()> {
         if !lengths(self.dim).contains(&reach) {
@@ -93,7 +103,7 @@ impl Domain {
         }
         for axis in (0..self.dim).filter(|&a| self.periodic[a]) {
             let length = self.length(axis);
-            if reach > length * MAX_IMAGES as f64 {
+            if reach > Self::images_of(length) {
                 return Err(Error::BoxTooSmall { axis, length, reach, index, images: MAX_IMAGES });
             }
         }

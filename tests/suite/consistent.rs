@@ -261,9 +261,9 @@ fn what_comes_in_at_a_face_or_from_a_source_is_accounted_for_or_refused() {
         let error = done.unwrap_err().to_string();
         assert!(error.contains("consistent") && error.contains("allow=energy") && rise == 0.0, "{name}: {error}");
     }
-    // Three quarters of what came in: that is what is refused.
+    // A twentieth more than what came in: that is what is refused.
     let (done, rise) = open("allow=energy", "flux_in", 1.0);
-    assert!(done.is_ok() && (0.3..0.4).contains(&rise), "{rise}");
+    assert!(done.is_ok() && (0.515..0.53).contains(&rise), "{rise}");
     // A source of next to nothing does not switch the account off.
     let x = lattice(14, 2, 0.2);
     let mut s = unit_box("operator=consistent", &x, 2, false);

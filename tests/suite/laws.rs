@@ -104,10 +104,11 @@ fn a_parabola_gives_the_second_moment() {
         let operator = find(operator).unwrap();
         let exact = (normalise != "none" && !operator.is_projected()) || !operator.is_one_matrix();
         let expected = if exact { 2.0 } else { 2.0 * k };
-        // Terms of order 1/h² ~ n² cancel down to 2.
-        assert!((rate - expected).abs() < 1e-10, "{words} dim {dim}: {rate} {expected}");
+        // Terms of order 1/h² ~ n² cancel down to 2; multipliers are found for distances in single precision.
+        let tolerance = if operator.is_projected() { 1e-8 } else { 1e-10 };
+        assert!((rate - expected).abs() < tolerance, "{words} dim {dim}: {rate} {expected}");
         let moment = s.get_all("first_moment").unwrap();
-        assert!(max_abs(&moment[centre * dim..(centre + 1) * dim]) < 1e-11, "{words}: first moment");
+        assert!(max_abs(&moment[centre * dim..(centre + 1) * dim]) < tolerance, "{words}: first moment");
     });
 }
 

@@ -39,4 +39,5 @@ mod stability;
 #[cfg(feature = "cli")]
 mod studies;
 mod tensor;
+mod thin;
 mod vtk_matrix;

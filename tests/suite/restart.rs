@@ -282,7 +282,11 @@ fn particles_that_do_not_fill_their_space_are_refused_unless_the_host_insists() 
     for part in ["flat along y", "100 particles", "dim=2", "allow=flat"] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    assert!(planar(&flat, "dim=3 allow=flat").unwrap().step(1e-3).is_ok());
+    // Summed along one layer, rho is that of a ball of neighbours.
+    let mut s = planar(&flat, "dim=3 allow=flat").unwrap();
+    assert!(s.step(1e-3).unwrap_err().to_string().contains("give rho"));
+    s.set_number("rho", 10.0).unwrap();
+    assert!(s.step(1e-3).is_ok());
     // A host's own arrays are looked at in the same way, and T stays as it is.
     let row: Vec<f64> = (0..20).flat_map(|i| [f64::from(i) / 20.0, 0.5]).collect();
     let mut s = Solver::new("heat dim=2 threads=1").unwrap();

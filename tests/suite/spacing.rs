@@ -7,7 +7,7 @@ use std::f64::consts::PI;
 
 /// A solver on a lattice of so many particles per axis, so far apart, each moved by up to `jitter` spacings; periodic as
 /// told, rho = kappa = 1.
-fn grid(words: &str, count: &[usize], spacing: &[f64], jitter: f64, periodic: &[bool]) -> (Solver, Vec<f64>) {
+pub fn grid(words: &str, count: &[usize], spacing: &[f64], jitter: f64, periodic: &[bool]) -> (Solver, Vec<f64>) {
     let (dim, n) = (count.len(), count.iter().product::<usize>());
     let mut random = Random(2);
     let x: Vec<f64> = (0..n)
