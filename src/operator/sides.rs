@@ -6,8 +6,7 @@
 
 use super::normalise::rise;
 use super::tensor::{self, Sym};
-use crate::space::Row;
-use crate::sum;
+use crate::space::{Axes, Row};
 use nalgebra::{Matrix3, Vector3};
 
 /// |Σ ω r̂|/Σ ω, ω = g r², up to which nobody is looked at closer: disorder makes 0.1, a plate of two layers has 0.3 and more.
@@ -20,6 +19,8 @@ const ONE: f64 = 0.9;
 const FACE: f64 = 0.85;
 const EDGE: f64 = 1.0;
 
+const LANES: usize = 4;
+
 /// What is to be asked for of a second moment.
 pub fn part_of(wanted: &Sym, dim: usize, row: &Row, g: &[f64]) -> Sym {
     match kept(dim, row, g) {
@@ -30,27 +31,57 @@ pub fn part_of(wanted: &Sym, dim: usize, row: &Row, g: &[f64]) -> Sym {
 
 /// K for which K S K is asked for where S is wanted: I where neighbours are all around, for which none stands.
 pub fn kept(dim: usize, row: &Row, g: &[f64]) -> Option<Matrix3<f64>> {
-    let mut skew = Vector3::zeros();
-    (0..dim).for_each(|axis| skew[axis] = sum::product(g, row.r, row.d[axis]));
-    let all = sum::product(g, row.r, row.r);
+    let ([x, y, z], all) = match dim {
+        1 => skew::<1>(row, g),
+        2 => skew::<2>(row, g),
+        _ => skew::<3>(row, g),
+    };
+    let skew = Vector3::new(x, y, z);
     let skewed = skew.norm() > SKEWED * all && all > 0.0 && all.is_finite();
-    skewed.then(|| halved(&Sides { dim, row, g }, skew.normalize()))
+    if skewed { halved(&Sides { dim, row, g }, skew.normalize()) } else { None }
+}
+
+/// Σ ω r̂ and Σ ω, ω = g r².
+#[inline(always)]
+fn skew<const D: usize>(row: &Row, g: &[f64]) -> (Axes<f64>, f64) {
+    let d: [&[f64]; D] = std::array::from_fn(|axis| &row.d[axis][..g.len()]);
+    let r = &row.r[..g.len()];
+    let (mut sums, mut all) = ([[0.0; LANES]; D], [0.0; LANES]);
+    let whole = g.len() - g.len() % LANES;
+    let mut add = |at: usize, lane: usize| {
+        let once = g[at] * r[at];
+        all[lane] += once * r[at];
+        for axis in 0..D {
+            sums[axis][lane] += once * d[axis][at];
+        }
+    };
+    for at in (0..whole).step_by(LANES) {
+        (0..LANES).for_each(|lane| add(at + lane, lane));
+    }
+    (whole..g.len()).for_each(|at| add(at, at - whole));
+    let total = |lanes: [f64; LANES]| (lanes[0] + lanes[1]) + (lanes[2] + lanes[3]);
+    let mut skew = [0.0; 3];
+    sums.into_iter().enumerate().for_each(|(axis, lanes)| skew[axis] = total(lanes));
+    (skew, total(all))
 }
 
 /// √½ along directions of which one side is empty: `normal`, and others where it points out of an edge.
 #[cold]
-fn halved(sides: &Sides, normal: Vector3<f64>) -> Matrix3<f64> {
+fn halved(sides: &Sides, normal: Vector3<f64>) -> Option<Matrix3<f64>> {
+    let one_sided = rise(sides.along(normal), BOTH, ONE);
+    if one_sided == 0.0 {
+        return None;
+    }
     let mut kept = Matrix3::identity();
     let mut keep = |e: Vector3<f64>, one_sided: f64| {
         kept -= e * e.transpose() * (1.0 - (1.0 - 0.5 * one_sided).sqrt());
     };
-    let one_sided = rise(sides.along(normal), BOTH, ONE);
     keep(normal, one_sided);
     for m in sides.across(normal) {
         let tilted = |sign: f64| sides.along((normal + m * sign).normalize());
         keep(m, one_sided * rise(tilted(1.0).min(tilted(-1.0)), FACE, EDGE));
     }
-    kept
+    Some(kept)
 }
 
 struct Sides<'a> {
