@@ -1,6 +1,7 @@
 //! Arrays whose size a host decides: reserved fallibly, because an abort on a failed allocation would take the host
 //! with it.
 
+mod huge;
 mod limits;
 // Without the feature all that is asked is whether it is low, and it never is.
 #[cfg_attr(not(feature = "reserve"), allow(dead_code))]
@@ -64,13 +65,16 @@ pub fn room<T>(what: &str, v: &mut Vec<T>, more: usize) -> Result<()> {
     if v.capacity() - v.len() >= more {
         return Ok(());
     }
-    granted::<T>(what, v.len() + more, || v.try_reserve(more))
+    granted::<T>(what, v.len() + more, || v.try_reserve(more))?;
+    huge::advise(v);
+    Ok(())
 }
 
 /// An empty array with room for exactly `n`, or `NoMemory`.
 pub fn reserved<T>(what: &str, n: usize) -> Result<Vec<T>> {
     let mut v = Vec::new();
     granted::<T>(what, n, || v.try_reserve_exact(n))?;
+    huge::advise(&v);
     Ok(v)
 }
 

@@ -1,5 +1,5 @@
-//! Stored weights of pairs: a sparse matrix in blocks of [`BLOCK`] rows, applied at the speed of the memory. Twelve bytes
-//! a pair: shorter columns (16 bits, named through a table of blocks) were measured to cost more in decoding than they
+//! Stored weights of pairs: a sparse matrix in stretches of rows, applied at the speed of the memory, block by block. Twelve
+//! bytes a pair: shorter columns (16 bits, named through a table of blocks) were measured to cost more in decoding than they
 //! save in reading.
 
 use super::{Kappa, Mean};
@@ -15,19 +15,33 @@ use std::ops::Range;
 /// far 1.2 and more (50³ and 100³ particles).
 const AHEAD: usize = 256;
 
+/// Blocks of a stretch at most: arrays of several MB are found in the memory by few addresses (huge pages), which makes
+/// sums over them 1.1 to 1.3 times as fast as over an array for each block.
+const STRETCH: usize = 16;
+/// Stretches for each worker, so that none waits long for another.
+const SHARES: usize = 4;
+
 /// Symmetric coefficients g_ab = V_a V_b w_ab (and what was folded into them), in rows.
 pub struct Matrix {
     n: usize,
-    blocks: Vec<Block>,
+    /// Rows of a stretch.
+    length: usize,
+    stretches: Vec<Stretch>,
 }
 
-pub struct Block {
+/// Rows that follow each other, a whole number of blocks but for the last ones.
+pub struct Stretch {
     first: usize,
     start: Vec<u32>,
     col: Vec<u32>,
     coef: Vec<f64>,
-    /// The blocks in which the neighbours live, sorted.
-    touches: Vec<u32>,
+    /// The blocks in which the neighbours of each block live, sorted.
+    touches: Vec<Vec<u32>>,
+}
+
+/// How many rows are made and kept together.
+pub fn length(n: usize, pool: &Pool) -> usize {
+    BLOCK * (n.div_ceil(BLOCK) / (SHARES * pool.threads())).clamp(1, STRETCH)
 }
 
 /// A worker's notes on which blocks a block's neighbours live in.
@@ -51,18 +65,30 @@ impl Seen {
     }
 }
 
-impl Block {
-    /// Block number `b` from the columns (all below `n`) and coefficients of its rows, row k from `start[k]` to
+impl Stretch {
+    /// Of the rows from particle `first` on, from their columns (all below `n`) and coefficients, row k from `start[k]` to
     /// `start[k + 1]`.
     ///
     /// # Errors
     /// `NoMemory`.
-    pub fn new(n: usize, b: usize, start: Vec<u32>, col: Vec<u32>, coef: Vec<f64>, seen: &mut Seen) -> Result<Block> {
+    pub fn new(
+        n: usize,
+        first: usize,
+        start: Vec<u32>,
+        col: Vec<u32>,
+        coef: Vec<f64>,
+        seen: &mut Seen,
+    ) -> Result<Stretch> {
         if col.len() > u32::MAX as usize {
             return Err(memory::no_memory::<(u32, f64)>("matrix", col.len()));
         }
-        let touches = seen.touched(n, &col)?;
-        Ok(Block { first: b * BLOCK, start, col: fitted(col)?, coef: fitted(coef)?, touches })
+        let mut touches = memory::reserved("block lists", (start.len() - 1).div_ceil(BLOCK))?;
+        for rows in
+            start[..start.len() - 1].chunks(BLOCK).enumerate().map(|(b, rows)| b * BLOCK..b * BLOCK + rows.len())
+        {
+            touches.push(seen.touched(n, &col[start[rows.start] as usize..start[rows.end] as usize])?);
+        }
+        Ok(Stretch { first, start, col: fitted(col)?, coef: fitted(coef)?, touches })
     }
 
     fn len(&self) -> usize {
@@ -74,21 +100,24 @@ impl Block {
         (self.first + k, self.start[k] as usize..self.start[k + 1] as usize)
     }
 
+    /// Of the rows from `from` on.
     fn sums(
         &self,
+        from: usize,
         t: &[f64],
         out: &mut [f64],
         finish: impl Fn(usize, f64) -> f64,
         g: impl Fn(usize, usize, f64) -> f64,
     ) {
         for (k, out) in out.iter_mut().enumerate() {
-            let (i, range) = self.row(k);
+            let (i, range) = self.row(from + k);
             *out = finish(i, row_sum(&self.col[range.clone()], &self.coef[range], t, t[i], |j, c| g(i, j, c)));
         }
     }
 
     fn bytes(&self) -> u64 {
-        memory::bytes(&self.start) + memory::bytes(&self.col) + memory::bytes(&self.coef) + memory::bytes(&self.touches)
+        let touches = self.touches.iter().map(memory::bytes).sum::<u64>();
+        memory::bytes(&self.start) + memory::bytes(&self.col) + memory::bytes(&self.coef) + touches
     }
 }
 
@@ -114,8 +143,19 @@ fn prefetch<T>(data: &[T]) {
 }
 
 impl Matrix {
-    pub fn new(n: usize, blocks: Vec<Block>) -> Matrix {
-        Matrix { n, blocks }
+    /// From all stretches, each of so many rows but for the last one.
+    pub fn new(n: usize, length: usize, stretches: Vec<Stretch>) -> Matrix {
+        Matrix { n, length, stretches }
+    }
+
+    /// Where the places of a particle's pairs count from: a number for each stretch.
+    pub fn stretch(&self, i: usize) -> usize {
+        i / self.length
+    }
+
+    /// Rows of a stretch.
+    pub fn length(&self) -> usize {
+        self.length
     }
 
     pub fn len(&self) -> usize {
@@ -128,11 +168,11 @@ impl Matrix {
 
     /// Stored pairs, both directions counted.
     pub fn pairs(&self) -> u64 {
-        self.blocks.iter().map(|b| b.coef.len() as u64).sum()
+        self.stretches.iter().map(|s| s.coef.len() as u64).sum()
     }
 
     pub fn bytes(&self) -> u64 {
-        self.blocks.iter().map(Block::bytes).sum()
+        self.stretches.iter().map(Stretch::bytes).sum()
     }
 
     /// Multiplies each coefficient by `factor(a, b)`, which must be symmetric to the bit.
@@ -140,15 +180,15 @@ impl Matrix {
         self.update(pool, move |a, b, _, g| g * factor(a, b));
     }
 
-    /// Replaces each coefficient by `value(a, b, place in its block, g_ab)`, which must be symmetric to the bit.
+    /// Replaces each coefficient by `value(a, b, place in its stretch, g_ab)`, which must be symmetric to the bit.
     pub fn update(&mut self, pool: &Pool, value: impl Fn(usize, usize, usize, f64) -> f64 + Copy + Sync + Send) {
-        pool.chunks(&mut self.blocks, 1, |_, part| {
+        pool.chunks(&mut self.stretches, 1, |_, part| {
             // A copy: what it refers to can then stay in registers while coefficients are written.
             let of_pair = value;
-            for block in part {
-                for k in 0..block.len() {
-                    let (i, range) = block.row(k);
-                    let pairs = block.coef[range.clone()].iter_mut().zip(&block.col[range.clone()]);
+            for stretch in part {
+                for k in 0..stretch.len() {
+                    let (i, range) = stretch.row(k);
+                    let pairs = stretch.coef[range.clone()].iter_mut().zip(&stretch.col[range.clone()]);
                     for ((g, &j), at) in pairs.zip(range) {
                         *g = of_pair(i, j as usize, at, *g);
                     }
@@ -170,8 +210,8 @@ impl Matrix {
         change: impl Fn(&mut B, &Row, &mut [f64]) -> Result<()> + Sync + Send,
     ) -> Result<()> {
         let failed = std::sync::Mutex::new(None);
-        pool.chunks(&mut self.blocks, 1, |_, part| {
-            for Block { first, start, coef, .. } in part {
+        pool.chunks(&mut self.stretches, 1, |_, part| {
+            for Stretch { first, start, coef, .. } in part {
                 let (mut buffers, range) = (B::default(), *first..*first + start.len() - 1);
                 let found = rows.visit_where(range, &mut Scratch::default(), &wanted, |row| {
                     let from = start[row.i - *first] as usize;
@@ -200,19 +240,22 @@ impl Matrix {
         assert!(t.len() == self.n && out.len() == self.n, "one value for each particle");
         let levels = quiet.then(|| self.levels(pool, t));
         pool.chunks(out, BLOCK, |start, part| {
-            let block = &self.blocks[start / BLOCK];
-            if levels.as_ref().is_some_and(|l| is_quiet(l, start / BLOCK, &block.touches)) {
+            let stretch = &self.stretches[start / self.length];
+            let from = start - stretch.first;
+            if levels.as_ref().is_some_and(|l| is_quiet(l, start / BLOCK, &stretch.touches[from / BLOCK])) {
                 return part.fill(0.0);
             }
             // One loop per average, so that the choice is made once per block and not once per pair.
             match kappa {
-                None => block.sums(t, part, &finish, |_, _, c| c),
-                Some((Mean::Harmonic, k)) => block.sums(t, part, &finish, |i, j, c| c * Mean::Harmonic.of(k[i], k[j])),
+                None => stretch.sums(from, t, part, &finish, |_, _, c| c),
+                Some((Mean::Harmonic, k)) => {
+                    stretch.sums(from, t, part, &finish, |i, j, c| c * Mean::Harmonic.of(k[i], k[j]))
+                }
                 Some((Mean::Arithmetic, k)) => {
-                    block.sums(t, part, &finish, |i, j, c| c * Mean::Arithmetic.of(k[i], k[j]))
+                    stretch.sums(from, t, part, &finish, |i, j, c| c * Mean::Arithmetic.of(k[i], k[j]))
                 }
                 Some((Mean::Geometric, k)) => {
-                    block.sums(t, part, &finish, |i, j, c| c * Mean::Geometric.of(k[i], k[j]))
+                    stretch.sums(from, t, part, &finish, |i, j, c| c * Mean::Geometric.of(k[i], k[j]))
                 }
             }
         });
@@ -222,12 +265,12 @@ impl Matrix {
     pub fn circles(&self, pool: &Pool, kappa: Kappa) -> Result<Vec<(f64, f64)>> {
         let mut out = memory::filled("row sums", self.n, (0.0, 0.0))?;
         pool.chunks(&mut out, BLOCK, |start, part| {
-            let block = &self.blocks[start / BLOCK];
+            let stretch = &self.stretches[start / self.length];
             for (k, out) in part.iter_mut().enumerate() {
-                let (i, range) = block.row(k);
+                let (i, range) = stretch.row(start - stretch.first + k);
                 let (mut absolute, mut signed) = (0.0f64, 0.0f64);
                 for at in range {
-                    let (j, c) = (block.col[at] as usize, block.coef[at]);
+                    let (j, c) = (stretch.col[at] as usize, stretch.coef[at]);
                     let g = kappa.map_or(c, |(mean, k)| c * mean.of(k[i], k[j]));
                     // An image of the particle itself exchanges nothing.
                     let g = if j == i { 0.0 } else { g };
@@ -246,18 +289,18 @@ impl Matrix {
 
     /// The stored neighbours of a particle.
     pub fn columns(&self, i: usize) -> &[u32] {
-        &self.blocks[i / BLOCK].col[self.places(i)]
+        &self.stretches[self.stretch(i)].col[self.places(i)]
     }
 
-    /// The places of its pairs in its block.
+    /// The places of its pairs in its stretch.
     pub fn places(&self, i: usize) -> Range<usize> {
-        let block = &self.blocks[i / BLOCK];
-        block.row(i - block.first).1
+        let stretch = &self.stretches[self.stretch(i)];
+        stretch.row(i - stretch.first).1
     }
 
     /// Their coefficients.
     pub fn coefficients(&self, i: usize) -> &[f64] {
-        &self.blocks[i / BLOCK].coef[self.places(i)]
+        &self.stretches[self.stretch(i)].coef[self.places(i)]
     }
 
     /// Replaces each coefficient by the mean of itself and its mate's, g_ba. Rows must list each other. `apart`: what is
@@ -267,15 +310,15 @@ impl Matrix {
     /// # Errors
     /// `NoMemory`.
     pub fn symmetrise(&mut self, apart: Option<&[Vec<[f32; 3]>]>, pool: &Pool) -> Result<()> {
-        let between = |i: usize, at: usize| apart.map_or([0.0; 3], |apart| apart[i / BLOCK][at]);
-        let made = pool.map(self.blocks.len(), |b| {
-            pool.go_on()?;
-            let block = &self.blocks[b];
-            let mut coef = memory::copied("matrix coefficients", &block.coef)?;
-            for k in 0..block.len() {
-                let (i, range) = block.row(k);
+        let between = |i: usize, at: usize| apart.map_or([0.0; 3], |apart| apart[self.stretch(i)][at]);
+        let made = pool.map(self.stretches.len(), |s| {
+            let stretch = &self.stretches[s];
+            let mut coef = memory::copied("matrix coefficients", &stretch.coef)?;
+            for k in 0..stretch.len() {
+                pool.go_on()?;
+                let (i, range) = stretch.row(k);
                 for at in range {
-                    let (j, back) = (block.col[at] as usize, between(i, at).map(|d| -d));
+                    let (j, back) = (stretch.col[at] as usize, between(i, at).map(|d| -d));
                     let mut mates = self.columns(j).iter().zip(self.coefficients(j)).zip(self.places(j));
                     let is_mate = |place: usize, c: u32| c as usize == i && between(j, place) == back;
                     let mate = mates.find(|((c, _), place)| is_mate(*place, **c)).map(|((_, mate), _)| mate);
@@ -285,37 +328,37 @@ impl Matrix {
             }
             Ok(coef)
         });
-        for (block, coef) in self.blocks.iter_mut().zip(made) {
-            block.coef = coef?;
+        for (stretch, coef) in self.stretches.iter_mut().zip(made) {
+            stretch.coef = coef?;
         }
         Ok(())
     }
 
     /// The smallest coefficient; negative where the operator breaks positivity on some pair.
     pub fn smallest(&self, pool: &Pool) -> f64 {
-        let of_block = |b: usize| self.blocks[b].coef.iter().copied().fold(f64::INFINITY, f64::min);
-        pool.map(self.blocks.len(), of_block).into_iter().fold(f64::INFINITY, f64::min)
+        let of_stretch = |s: usize| self.stretches[s].coef.iter().copied().fold(f64::INFINITY, f64::min);
+        pool.map(self.stretches.len(), of_stretch).into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// How many coefficients are negative.
     pub fn negative(&self, pool: &Pool) -> usize {
-        let of_block = |b: usize| self.blocks[b].coef.iter().filter(|c| **c < 0.0).count();
-        pool.map(self.blocks.len(), of_block).into_iter().sum()
+        let of_stretch = |s: usize| self.stretches[s].coef.iter().filter(|c| **c < 0.0).count();
+        pool.map(self.stretches.len(), of_stretch).into_iter().sum()
     }
 
     /// The first particle with a coefficient that is not a finite number.
     pub fn first_bad(&self, pool: &Pool) -> Option<usize> {
-        let of_block = |b: usize| {
-            let block: &Block = &self.blocks[b];
-            let bad = block.coef.iter().position(|c| !c.is_finite())?;
-            (0..block.len()).map(|k| block.row(k)).find(|(_, range)| range.contains(&bad)).map(|(i, _)| i)
+        let of_stretch = |s: usize| {
+            let stretch: &Stretch = &self.stretches[s];
+            let bad = stretch.coef.iter().position(|c| !c.is_finite())?;
+            (0..stretch.len()).map(|k| stretch.row(k)).find(|(_, range)| range.contains(&bad)).map(|(i, _)| i)
         };
-        pool.map(self.blocks.len(), of_block).into_iter().flatten().next()
+        pool.map(self.stretches.len(), of_stretch).into_iter().flatten().next()
     }
 
     /// One value for each block whose members all have it.
     fn levels(&self, pool: &Pool, t: &[f64]) -> Vec<Option<f64>> {
-        pool.map(self.blocks.len(), |b| {
+        pool.map(self.n.div_ceil(BLOCK), |b| {
             let part = &t[b * BLOCK..((b + 1) * BLOCK).min(self.n)];
             part.iter().all(|&v| v == part[0]).then_some(part[0])
         })
@@ -376,9 +419,9 @@ mod tests {
                 }
                 start.push(col.len() as u32);
             }
-            list.push(Block::new(n, b, start, col, coef, &mut seen).unwrap());
+            list.push(Stretch::new(n, b * BLOCK, start, col, coef, &mut seen).unwrap());
         }
-        (Matrix::new(n, list), t, sums)
+        (Matrix::new(n, BLOCK, list), t, sums)
     }
 
     #[test]

@@ -5,15 +5,16 @@
 //! sums. Rows are gathered by their owner in a fixed order.
 
 use super::assembly::{self, Assembly};
-use super::matrix::{Block, Matrix, Seen, row_sum};
+use super::matrix::{self, Matrix, Seen, Stretch, row_sum};
 use super::normalise::{self, Normals};
 use super::table::{self, Fit, Join, Normalise};
 use super::{Kappa, apart, consistent, moments, projected, stencils};
 use crate::error::Result;
 use crate::memory;
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 use crate::space::{Axes, Row, Scratch};
 use crate::sum;
+use std::ops::Range;
 
 /// Buffers of one worker for rows of weights.
 #[derive(Default)]
@@ -93,21 +94,23 @@ impl Assembly<'_> {
     /// `NoMemory`; `Cancelled`.
     pub fn rows(&self, pool: &Pool) -> Result<(Matrix, Normals)> {
         let n = self.volume.len();
-        let mut blocks = memory::reserved("matrix", n.div_ceil(BLOCK))?;
+        let length = matrix::length(n, pool);
+        let mut stretches = memory::reserved("matrix", n.div_ceil(length))?;
         let mut normals = Normals {
             moments: memory::reserved("second moments", n)?,
             tensors: memory::reserved("second moments", if self.turns_pairs() { n } else { 0 })?,
             paired: memory::reserved("rows", if self.may_pair() { n } else { 0 })?,
             defect: None,
         };
-        for block in pool.map_init(n.div_ceil(BLOCK), Workspace::default, |space, b| self.block(space, b)) {
-            let (block, k) = block?;
-            blocks.push(block);
+        let stretch = |space: &mut Workspace, s: usize| self.stretch(space, s * length..((s + 1) * length).min(n));
+        for made in pool.map_init(n.div_ceil(length), Workspace::default, stretch) {
+            let (stretch, k) = made?;
+            stretches.push(stretch);
             normals.moments.extend_from_slice(&k.moments);
             normals.tensors.extend_from_slice(&k.tensors);
             normals.paired.extend_from_slice(&k.paired);
         }
-        Ok((Matrix::new(n, blocks), normals))
+        Ok((Matrix::new(n, length, stretches), normals))
     }
 
     /// What the operator does to all rows together.
@@ -190,7 +193,7 @@ impl Assembly<'_> {
         if self.rows.nearest::<3>().is_some() {
             return matrix.symmetrise(None, pool);
         }
-        matrix.symmetrise(Some(&apart::of(self.rows, self.rows.largest(), pool)?), pool)
+        matrix.symmetrise(Some(&apart::of(self.rows, matrix.length(), self.rows.largest(), pool)?), pool)
     }
 
     /// As [`Matrix::apply`], with weights that are made for this one application and not kept: the same bits.
@@ -218,10 +221,10 @@ impl Assembly<'_> {
         })
     }
 
-    fn block(&self, space: &mut Workspace, b: usize) -> Result<(Block, Normals)> {
-        let range = b * BLOCK..((b + 1) * BLOCK).min(self.volume.len());
+    fn stretch(&self, space: &mut Workspace, range: Range<usize>) -> Result<(Stretch, Normals)> {
+        let first = range.start;
         let Workspace { scratch, buffers, seen, pairs } = space;
-        // Made in place, in as much room as the last block took: a copy would cost as much as the weights themselves.
+        // Made in place, in as much room as the last stretch took: a copy would cost as much as the weights themselves.
         let mut col = memory::reserved("matrix columns", *pairs)?;
         let mut coef = memory::reserved("matrix coefficients", *pairs)?;
         let mut start = memory::reserved("matrix rows", range.len() + 1)?;
@@ -250,7 +253,7 @@ impl Assembly<'_> {
             Ok(())
         })?;
         *pairs = col.len() + col.len() / 64;
-        Ok((Block::new(self.volume.len(), b, start, col, coef, seen)?, normals))
+        Ok((Stretch::new(self.volume.len(), first, start, col, coef, seen)?, normals))
     }
 }
 
@@ -259,6 +262,6 @@ struct Workspace {
     scratch: Scratch,
     buffers: Buffers,
     seen: Seen,
-    /// Room for the pairs of a block.
+    /// Room for the pairs of a stretch.
     pairs: usize,
 }

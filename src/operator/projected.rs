@@ -16,7 +16,7 @@ use super::tensor::{self, Sym};
 use super::{Matrix, apart};
 use crate::error::Result;
 use crate::memory;
-use crate::pool::{BLOCK, Pool};
+use crate::pool::Pool;
 use crate::sum;
 use nalgebra::{Cholesky, Const, SMatrix, SVector};
 
@@ -54,12 +54,13 @@ fn project_in<const D: usize, const C: usize>(assembly: &Assembly, matrix: &mut 
     let n = matrix.len();
     let unit = sum::max(pool, n, |i| assembly.rows.h[i]);
     // Single precision holds the conditions to 1e-7.
-    let apart = apart::of(assembly.rows, unit, pool)?;
+    let apart = apart::of(assembly.rows, matrix.length(), unit, pool)?;
     let shape = assembly.shape.filter(|_| assembly.operator.takes_tensors);
     let problem = Problem::<D, C> { pool, prior: matrix, apart: &apart, volume: assembly.volume, unit, shape };
     let lambda = problem.newton()?;
     let (apart, lambda) = (&apart[..], &lambda[..]);
-    matrix.update(pool, move |i, j, at, g| g * factor(&psi(&apart[i / BLOCK][at]), &lambda[i], &lambda[j]));
+    let length = matrix.length();
+    matrix.update(pool, move |i, j, at, g| g * factor(&psi(&apart[i / length][at]), &lambda[i], &lambda[j]));
     Ok(())
 }
 
@@ -104,7 +105,7 @@ fn factor<const D: usize, const C: usize>(psi: &Psi<D, C>, a: &Vector<C>, b: &Ve
 struct Problem<'a, const D: usize, const C: usize> {
     pool: &'a Pool,
     prior: &'a Matrix,
-    /// d of every pair, block by block.
+    /// d of every pair, stretch by stretch.
     apart: &'a [Vec<[f32; D]>],
     volume: &'a [f64],
     /// Of length.
@@ -113,7 +114,7 @@ struct Problem<'a, const D: usize, const C: usize> {
     shape: Option<&'a [Sym]>,
 }
 
-/// Particles a and b, the place of the pair in a's block, and g_ab.
+/// Particles a and b, the place of the pair in a's stretch, and g_ab.
 struct Pair {
     a: usize,
     b: usize,
@@ -158,7 +159,7 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
     #[inline(always)]
     fn pairs(&self, a: usize) -> impl Iterator<Item = (Psi<D, C>, Pair)> {
         let places = self.prior.places(a);
-        let apart = &self.apart[a / BLOCK][places.clone()];
+        let apart = &self.apart[self.prior.stretch(a)][places.clone()];
         let others = self.prior.columns(a).iter().zip(self.prior.coefficients(a));
         apart.iter().zip(others).zip(places).map(move |((d, (&b, &g)), at)| (psi(d), Pair { a, b: b as usize, at, g }))
     }
@@ -227,11 +228,12 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
         for apart in self.apart {
             used.push(memory::filled("pairs in use", apart.len(), false)?);
         }
-        self.pool.chunks(&mut used, 1, |block, used| {
+        let length = self.prior.length();
+        self.pool.chunks(&mut used, 1, |stretch, used| {
             if self.pool.go_on().is_err() {
                 return;
             }
-            for a in block * BLOCK..((block + 1) * BLOCK).min(self.prior.len()) {
+            for a in stretch * length..((stretch + 1) * length).min(self.prior.len()) {
                 for (psi, Pair { b, at, .. }) in self.pairs(a) {
                     used[0][at] = factor(&psi, &lambda[a], &lambda[b]) > 0.0;
                 }
@@ -272,7 +274,7 @@ impl<const D: usize, const C: usize> Problem<'_, D, C> {
             self.each(&mut p, |i, p| *p = z[i] + *p * (rz / before))?;
             q.fill(Vector::zeros());
             self.over_pairs(&mut q, |q, psi, Pair { a, b, at, g }| {
-                if used[a / BLOCK][at] {
+                if used[self.prior.stretch(a)][at] {
                     *q += psi.0 * (g * psi.of(&p[a], &p[b]));
                 }
             })?;

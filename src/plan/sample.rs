@@ -144,7 +144,8 @@ impl State {
         let all = roundness(&seen.iter().map(|s| s.around).sum::<Matrix3<f64>>(), dim);
         let emptied = thin > if many { MOST_THIN } else { MOST_THIN_OF_FEW } && round < ROUND;
         let body = seen.len() >= FEWEST_OF_BODIES && (inside.len() as f64) < ALL_INSIDE * seen.len() as f64;
-        if !squeezed && !emptied && !(body && all < LEAST_ROUND_OF_BODIES) {
+        let thin_body = body && all < LEAST_ROUND_OF_BODIES;
+        if !(squeezed || emptied || thin_body) {
             return Ok(());
         }
         let worst = seen.iter().min_by(|a, b| a.roundness(dim).total_cmp(&b.roundness(dim)));
